@@ -37,7 +37,7 @@ render stage with_volume.py "$pictures/stage_by_volume.png" \
 beside stage "$pictures/stage.png" "Beamspread" "$pictures/stage_by_volume.png" "Cycles, paths through the volume" \
     "$pictures/stage_diffuse.png" "Cycles, diffuse"
 
-for scene in round_soap jade_bowl marble_head; do
+for scene in round_soap jade_bowl marble_head paper_page paper_shade; do
     render "$scene" with_paths.py "$pictures/${scene}_by_paths.png" 128
     beside "$scene" "$pictures/$scene.png" "Beamspread" \
         "$pictures/${scene}_by_paths.png" "Cycles, paths through the volume"

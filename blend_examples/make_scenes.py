@@ -21,6 +21,8 @@ import jade_bowl  # noqa: E402
 import low_sun  # noqa: E402
 import marble_floor  # noqa: E402
 import marble_head  # noqa: E402
+import paper_page  # noqa: E402
+import paper_shade  # noqa: E402
 import plank_floor  # noqa: E402
 import round_soap  # noqa: E402
 import scene_parts as parts  # noqa: E402
@@ -99,6 +101,8 @@ def main():
         "marble_floor": marble_floor.build,
         "marble_head": marble_head.build,
         "low_sun": low_sun.build,
+        "paper_page": paper_page.build,
+        "paper_shade": paper_shade.build,
         "plank_floor": plank_floor.build,
         "round_soap": round_soap.build,
         "soapstone": soapstone.build,

@@ -22,7 +22,7 @@ def show(bake):
     nodes = bpy.data.materials[bake["material"]].node_tree.nodes
     node = next(node for node in nodes if node.bl_idname == "BeamspreadNode")
     image = bpy.data.images.load(bake["path"], check_existing=True)
-    node.image = image
+    setattr(node, "image_back" if bake["side"] == "BACK" else "image", image)
 
 
 def main():

@@ -2,8 +2,8 @@
 
     blender -b --factory-startup SCENE.blend --python-exit-code 1 --python with_paths.py -- OUT.png SAMPLES
 
-Every Beamspread node becomes a volume of the same medium without a surface. It must not refract: paths through a
-refracting surface don't find lamps.
+Every Beamspread node becomes a volume of the same medium without a surface; sheets with a thickness become solid. The
+medium must not refract: paths through a refracting surface don't find lamps.
 """
 
 import sys
@@ -40,6 +40,12 @@ def replace(tree, node):
     tree.links.new(add.outputs[0], output.inputs["Volume"])
 
 
+def make_solid(obj, thickness):
+    """Give a sheet its thickness, half of it on each side."""
+    solidify = obj.modifiers.new("Thickness", "SOLIDIFY")
+    solidify.thickness, solidify.offset, solidify.use_even_offset = thickness, 0.0, True
+
+
 def main():
     picture, samples = sys.argv[sys.argv.index("--") + 1 :]
     beamspread.register()
@@ -47,6 +53,9 @@ def main():
         for material in bpy.data.materials:
             for node in list(material.node_tree.nodes) if material.node_tree else ():
                 if node.bl_idname == "BeamspreadNode":
+                    for obj in bpy.data.objects if node.thickness > 0 else ():
+                        if material.name in obj.material_slots:
+                            make_solid(obj, node.thickness)
                     replace(material.node_tree, node)
         scene = bpy.context.scene
         cycles = scene.cycles

@@ -28,6 +28,8 @@ KINDS = {
     "round_soap": ["AreaLight", "WorldLight"],
     "jade_bowl": ["AreaLight", "MeshLight", "PointLight"],
     "marble_head": ["SunLight", "WorldLight"],
+    "paper_page": ["PointLight", "WorldLight"],
+    "paper_shade": ["MeshLight", "WorldLight"],
 }
 PARTS = {"soap_bar": 1, "plank_floor": 35, "acrylic_letters": 6}
 

@@ -149,17 +149,3 @@ def test_a_medium_that_absorbs_all_light_is_not_dark():
     assert not one.texture.any()
     assert not one.is_dark
     assert not one.messages
-
-
-def test_light_behind_a_slab_is_named():
-    above, below = LAMP, replace(LAMP, name="Low lamp", position=(0.0, 0.0, -1.0))
-    rising = replace(SUN, name="Rising sun", direction=(0.0, 0.6, 0.8))
-    assert job([above, SUN], thickness=0.1).messages() == []
-    assert job([above, below, rising]).messages() == []  # endlessly thick
-    assert job([above, below], IRRADIANCE, thickness=0.1).messages() == []  # all light that arrives in front counts
-    (some,) = job([above, below, rising], thickness=0.1).messages()
-    assert some.text.startswith("Light that shines through the slab 'Plane' from behind is not baked yet")
-    assert some.text.endswith("that of 'Low lamp', 'Rising sun'.")
-    through, black = job([below], thickness=0.1).messages()
-    assert through.text.endswith("that of 'Low lamp'.")
-    assert "it is black" in black.text

@@ -5,7 +5,7 @@ import json
 from beamspread.core.batch.report import BakeRecord, Report
 
 KEYS = {"object", "material", "frame", "path", "width", "height", "seconds", "status", "message"}
-KEYS |= {"output", "lights", "left_out", "indirect", "dark", "estimated_seconds", "exposure"}
+KEYS |= {"output", "lights", "left_out", "indirect", "dark", "estimated_seconds", "exposure", "side"}
 
 
 def test_saved_report_has_the_documented_keys(tmp_path):

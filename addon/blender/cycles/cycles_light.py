@@ -97,7 +97,7 @@ class CyclesLight:
         illumination, scene = job.illumination, bpy.data.scenes[self._names[0]]
         world = self._world if self._world in illumination.by_cycles else ""
         bounced = job.settings.indirect and bool(illumination.lights or illumination.by_cycles)
-        bounced = bounced and self.is_below_something(chart.grid for chart in job.receiver.charts)
+        bounced = bounced and self.is_below_something(job.lit_grids)
         objects = [name for name in illumination.by_cycles if name != world and name in scene.objects]
         if job.receiver.is_bent:
             objects = [name for name in objects if name not in self._lamps]  # fields of lamps lie on planes
@@ -240,18 +240,18 @@ class LightByCycles(Step):
 
         The fraction is that of the irradiance without obstacles on both sides; infinite if there is no other light.
         """
-        receiver, lights = job.receiver, job.illumination.lights
-        without_obstacles = mean_over(receiver, lambda grid: _open_irradiance_of_both_sides(grid, lights))
+        receiver, lights, grids = job.receiver, job.illumination.lights, job.lit_grids
+        without_obstacles = mean_over(grids, lambda grid: _open_irradiance_of_both_sides(grid, lights))
         nodes = nodes or NODES
-        bent = bent_nodes_of(receiver, nodes) if receiver.is_bent else []
-        charts = [_chart_of(of_chart) for of_chart in bent] or charts_of(receiver, nodes)
+        bent = bent_nodes_of(grids, nodes) if receiver.is_bent else []
+        charts = [_chart_of(of_chart) for of_chart in bent] or charts_of(grids, nodes)
         request = REQUEST | {
             "charts": charts,
             "with_world": self.has_world,
             "reflectances": self.copy.reflectances,
             "textures": self.copy.textures,
             "tolerance": NOISE,
-            "direct": mean_over(receiver, lambda grid: mean_irradiance(grid, job.illumination)),
+            "direct": mean_over(grids, lambda grid: mean_irradiance(grid, job.illumination)),
             "open": without_obstacles,
             "variance": smoothing_variance(receiver, job.surface, job.settings, nodes),
             "most_samples": MAX_SAMPLES,
@@ -260,11 +260,10 @@ class LightByCycles(Step):
         radiances = [arrays[f"radiance_{n}"] for n in range(len(charts))]
         if bent:
             fields = tuple(
-                BentField(of_chart.positions, of_chart.normals, of_chart.spacing, radiance[:, :, 0])
-                for of_chart, radiance in zip(bent, radiances)
+                BentField(of_grid.positions, of_grid.normals, of_grid.spacing, radiance[:, :, 0], grid.is_back)
+                for grid, of_grid, radiance in zip(grids, bent, radiances)
             )
         else:
-            grids = (chart.grid for chart in receiver.charts)
             fields = tuple(Field(grid.origin, grid.normal, radiance) for grid, radiance in zip(grids, radiances))
         noise, irradiance = float(arrays["noise"]), float(arrays["irradiance"])
         fraction = irradiance / without_obstacles if without_obstacles > 0 else math.inf * (irradiance > 0)

@@ -14,9 +14,10 @@ from ...core.errors import BakeError, ReceiverError
 from ...core.messages import Level, Message, note, warning
 from ...core.scene.flat_mesh import flatten
 from ...core.scene.unwrap import unwrap
-from ...core.target import Target
+from ...core.target import BACK, FRONT, Target
 from .. import popup
 from ..node.find import BakeTarget, targets_of
+from ..node.node import set_image
 from ..node.tree import keep_map, own_tree
 from ..node.uv_maps import make_maps_together
 from ..read.geometry import OWN_MAP, read_polygons
@@ -111,16 +112,26 @@ def _make(depsgraph, scene, targets: list[BakeTarget]) -> list[Message]:
     length = image_length(make_maps_together(depsgraph, materials))
     nodes = {target.node.as_pointer(): target.node for target in targets}
     side = max(scene.beamspread.side_for(length, node.surface(), node.has_texture()) for node in nodes.values())
-    bake = Bake(Target(""))
-    _path, image = store_new(NAME, np.zeros((side, side, 3), np.float32), bake)
+    bake, messages = Bake(Target("")), []
     for node in nodes.values():
-        node.uv_map, node.image = OWN_MAP, image
+        node.uv_map = OWN_MAP
+    for face in (FRONT, BACK):
+        shown = [target for target in targets if target.side == face]
+        if not shown:
+            continue
+        name = NAME if face == FRONT else f"{NAME} {face.title()}"
+        _path, image = store_new(name, np.zeros((side, side, 3), np.float32), bake)
+        for target in shown:
+            set_image(target.node, image, face)
+        count = len({target.obj for target in shown})
+        number = f"{count} object{'s have their' if count > 1 else ' has its'}"
+        text = f"{number} place in the image '{image.name}' of {side} x {side} texels: Bake fills it."
+        messages.append(note(image.name, text))
+    for node in nodes.values():
         tree = own_tree(node)
         if tree is not None:
             keep_map(tree, OWN_MAP)
-    number = f"{len(materials)} object{'s have their' if len(materials) > 1 else ' has its'}"
-    text = f"{number} place in the image '{image.name}' of {side} x {side} texels: Bake fills it."
-    return [*bake.messages, note(image.name, text)]
+    return [*bake.messages, *messages]
 
 
 register, unregister = all_or_nothing(*classes(BEAMSPREAD_OT_make_atlas))

@@ -20,7 +20,7 @@ from ...core.bake.pace import pace
 from ...core.bake.runner import Bake
 from ...core.disk import text_of
 from ...core.messages import Level, Message, note, warning
-from ...core.target import Target
+from ...core.target import FRONT, Target
 from ..node.find import BakeTarget, targets_of
 from ..read.digests import SCHEME
 from ..read.visibility import with_instanced
@@ -128,7 +128,12 @@ def facts_of(image) -> ImageFacts:
 
 def set_facts(image, facts: ImageFacts) -> None:
     """Replace the facts of an image."""
-    bakes = [(target.object_name, target.material_name, asdict(record)) for target, record in facts.bakes.items()]
+    # Earlier versions know no sides.
+    sides = {target: [target.side] if target.side != FRONT else [] for target in facts.bakes}
+    bakes = [
+        (target.object_name, target.material_name, *sides[target], asdict(record))
+        for target, record in facts.bakes.items()
+    ]
     known = {"version": VERSION, "bakes": bakes, "stamp": facts.stamp, "is_undone": facts.is_undone}
     pointers = {} if facts.former is None else {"former": facts.former}
     image[KEY] = {"facts": json.dumps(known | {"frames": facts.frames}), **pointers}

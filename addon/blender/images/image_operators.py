@@ -18,9 +18,9 @@ from ...core.bake.runner import Bake
 from ...core.batch.batch_options import parse
 from ...core.errors import ImageError
 from ...core.messages import Message, warning
-from ...core.target import Target
+from ...core.target import BACK, FRONT, Target
 from ..node.find import BakeTarget, find_node, targets_of
-from ..node.node import link_result
+from ..node.node import image_of_side, link_result, set_image
 from ..node.tree import follow_frames
 from ..read.visibility import with_instanced
 from ..registration import all_or_nothing, classes
@@ -31,12 +31,13 @@ from .outputs import Outputs
 from .udim import is_tiled
 
 
-def image_in(context):
-    """The image of the active material's Beamspread node, or None."""
+def images_in(context) -> list:
+    """Images that the active material's Beamspread node shows."""
     # `context.object` is empty in the render properties.
     material = getattr(context, "material", None) or getattr(context.view_layer.objects.active, "active_material", None)
     node = find_node(material)
-    return None if node is None or material.library is not None else node.image
+    images = () if node is None or material.library is not None else node.shown_images()
+    return list(dict.fromkeys(image for image in images if image is not None))
 
 
 def wanted_size(size: Sequence[int], resolution: int) -> tuple[int, int]:
@@ -45,16 +46,23 @@ def wanted_size(size: Sequence[int], resolution: int) -> tuple[int, int]:
 
 
 class ImageOperator:
-    """Operator on the image of the active material's node."""
+    """Operator on the images of the active material's node that need it."""
 
     bl_options = {"REGISTER", "UNDO"}
 
     @classmethod
     def poll(cls, context):
-        image = image_in(context)
-        if image is None or is_tiled(image):
-            return False
-        return 0 not in image.size and image.library is None and cls.needed(context, image)
+        return bool(cls.chosen(context))
+
+    @classmethod
+    def chosen(cls, context) -> list:
+        images = [image for image in images_in(context) if not is_tiled(image) and image.library is None]
+        return [image for image in images if 0 not in image.size and cls.needed(context, image)]
+
+    def execute(self, context):
+        for image in self.chosen(context):
+            self.change(context, image)
+        return {"FINISHED"}
 
 
 class BEAMSPREAD_OT_make_float(ImageOperator, bpy.types.Operator):
@@ -67,8 +75,7 @@ class BEAMSPREAD_OT_make_float(ImageOperator, bpy.types.Operator):
     def needed(cls, _context, image) -> bool:
         return files.clips(image)
 
-    def execute(self, context):
-        image = image_in(context)
+    def change(self, _context, image) -> None:
         name, bakes = image.name, facts_of(image).bakes
         bake = Bake(Target(""))
         _path, new = store_new(name, files.linear_pixels(image), bake, image.colorspace_settings.is_data)
@@ -77,11 +84,11 @@ class BEAMSPREAD_OT_make_float(ImageOperator, bpy.types.Operator):
         set_facts(new, replace(facts_of(new), bakes=bakes))
         for material in bpy.data.materials:
             node = find_node(material)
-            if node is not None and node.image == new:
-                node.image = new  # the inner tree shows it
+            for side in (FRONT, BACK):
+                if node is not None and image_of_side(node, side) == new:
+                    set_image(node, new, side)  # the inner tree shows it
         for message in bake.messages:
             self.report({message.level.value}, str(message))
-        return {"FINISHED"}
 
 
 class BEAMSPREAD_OT_resize_image(ImageOperator, bpy.types.Operator):
@@ -99,11 +106,9 @@ class BEAMSPREAD_OT_resize_image(ImageOperator, bpy.types.Operator):
         settings = context.scene.beamspread
         return settings.use_size or tuple(image.size) != wanted_size(image.size, settings.resolution)
 
-    def execute(self, context):
-        image = image_in(context)
+    def change(self, context, image) -> None:
         icons.scale(image, *wanted_size(image.size, self.side or context.scene.beamspread.resolution))
         image.update_tag()  # Blender sends no update for a new size
-        return {"FINISHED"}
 
 
 def find_frames(scene, target: Target) -> tuple[list[int], Path]:
@@ -122,9 +127,10 @@ def find_frames(scene, target: Target) -> tuple[list[int], Path]:
     return numbers, path.with_name(f"{start}{numbers[0]:04d}{ending}") if numbers else path
 
 
-def show_frames(node, numbers: list[int], path: Path) -> list[Message]:
-    """Have the node show the sequence that begins with the file; messages as of `link_result`."""
-    former = (is_sequence(node.image) and facts_of(node.image).former) or node.image
+def show_frames(node, numbers: list[int], path: Path, side: str = FRONT) -> list[Message]:
+    """Have a side of the node show the sequence that begins with the file; messages as of `link_result`."""
+    shown = image_of_side(node, side)
+    former = (is_sequence(shown) and facts_of(shown).former) or shown
     image = bpy.data.images.load(str(path))
     size = tuple(image.size)  # a sequence has none
     image.name = re.sub(r"_\d+$", "", path.stem) + " frames"
@@ -133,8 +139,8 @@ def show_frames(node, numbers: list[int], path: Path) -> list[Message]:
     facts = facts_of(image)
     facts.frames, facts.former = Frames(numbers[0], numbers[-1], *size), former
     set_facts(image, facts)
-    messages = link_result(node, image)
-    follow_frames(node.node_tree, numbers[0], numbers[-1])
+    messages = link_result(node, image, side=side)
+    follow_frames(node.node_tree, image, numbers[0], numbers[-1])
     return messages
 
 
@@ -166,7 +172,7 @@ Each node keeps its own image for Show Single Images"""
         return {"FINISHED"}
 
     def _show(self, target: BakeTarget, numbers: list[int], path: Path) -> None:
-        messages = show_frames(target.node, numbers, path)
+        messages = show_frames(target.node, numbers, path, target.side)
         missing = numbers[-1] - numbers[0] + 1 - len(numbers)
         if missing:
             text = f"{missing} of the frames {numbers[0]} to {numbers[-1]} of '{target.name}' are missing."
@@ -188,7 +194,7 @@ class BEAMSPREAD_OT_show_single(bpy.types.Operator):
 
     def execute(self, context):
         for target in _targets_with_frames(context.scene):
-            target.node.image = facts_of(target.image).former
+            set_image(target.node, facts_of(target.image).former, target.side)
         return {"FINISHED"}
 
 

@@ -13,14 +13,15 @@ from ...core.bake.runner import Bake
 from ...core.disk import stem
 from ...core.errors import ImageError
 from ...core.messages import Message, warning
-from ...core.target import Target
+from ...core.target import BACK, Target
 from . import files, icons, undo
 
 
 def name_for(target: Target) -> str:
     """Name of a new image for the target, by the scene's settings."""
     pattern = bpy.context.scene.beamspread.image_name or "{object}_{material}"
-    return pattern.replace("{object}", target.object_name).replace("{material}", target.material_name)
+    name = pattern.replace("{object}", target.object_name).replace("{material}", target.material_name)
+    return f"{name}_back" if target.side == BACK else name
 
 
 def store_new(name: str, texture: np.ndarray, bake: Bake, is_data: bool = False) -> tuple[str, bpy.types.Image]:

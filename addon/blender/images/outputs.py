@@ -122,7 +122,7 @@ def _has_size(image, size: tuple[int, int], tiling: Tiling | None) -> bool:
 
 
 def _names(target: Target, layer: str) -> tuple[str, ...]:
-    return target.object_name, target.material_name, *([] if layer == COMBINED else [layer])
+    return *target.names, *([] if layer == COMBINED else [layer])
 
 
 def _is_limited(file_format: str) -> bool:

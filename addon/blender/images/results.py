@@ -15,7 +15,7 @@ from ...core.scene.tiles import Tiling
 from ...core.target import Target
 from ..node import plain
 from ..node.find import find_node, node_of, uses_tiles
-from ..node.node import link_result
+from ..node.node import image_of_side, link_result
 from ..read.geometry import read_polygons
 from . import files, icons, tiled
 from .facts import note_bake, owners_of, users_of, users_of_material
@@ -37,7 +37,7 @@ class Results:
         if bake.job is None:
             return bake
         try:
-            self._plan(_node(bake.target, bake.job.settings.layer).image, bake)
+            self._plan(image_of_side(_node(bake.target, bake.job.settings.layer), bake.target.side), bake)
         except BakeError as error:
             return Bake(bake.target, error=error)
         return bake
@@ -71,7 +71,7 @@ class Results:
             return self._store_beside(node, bake, layer, texture)
         path, image = self._store_shown(node, bake, texture)
         self._warn_of_other_maps(image, bake)
-        bake.messages.add(*link_result(node, image, bake.job.receiver.uv_map))
+        bake.messages.add(*link_result(node, image, bake.job.receiver.uv_map, bake.target.side))
         return path
 
     def fill(self, image, bake: Bake, texture: np.ndarray, shown=None) -> str | None:
@@ -107,7 +107,7 @@ class Results:
         return path
 
     def _store_shown(self, node, bake: Bake, texture: np.ndarray) -> tuple[str, bpy.types.Image]:
-        image = node.image
+        image = image_of_side(node, bake.target.side)
         if image is None:
             return self._new(bake, texture)
         separate = tiled.separate_from_other_scene if is_tiled(image) else separate_from_other_scene
@@ -127,7 +127,7 @@ class Results:
 
     def _new(self, bake: Bake, texture: np.ndarray) -> tuple[str, bpy.types.Image]:
         """Store the bake in a new image; texels of objects with the same material, which will share it, stay empty."""
-        users = users_of_material(bake.target.material_name)
+        users = [user for user in users_of_material(bake.target.material_name) if user.side == bake.target.side]
         neighbors = self._parts_beside(bake, users, bake.job.receiver.tiling or texture.shape[1::-1])
         if neighbors:
             filled = texels_of(bake.target, bake.job.receiver, neighbors, bake.job.settings.margin)
@@ -141,7 +141,7 @@ class Results:
         target, uv_map = bake.target, bake.job.receiver.uv_map
         self._maps[target] = uv_map
         for owner in owners_of(image):
-            if owner == target or owner.material_name != target.material_name:
+            if owner == target or owner.image_key != target.image_key:
                 continue
             if owner not in self._maps:
                 self._maps[owner] = _map_of(owner)
@@ -156,14 +156,15 @@ class Results:
 
     def _store_beside(self, node, bake: Bake, layer: str, texture: np.ndarray) -> str:
         """Fill the image of a layer that no node shows; its name begins with that of the node's image."""
-        names = [f"{node.image.name} {layer}"] if node.image else []
+        own = image_of_side(node, bake.target.side)
+        names = [f"{own.name} {layer}"] if own else []
         for name in [*names, f"{name_for(bake.target)} {layer}"]:
             image, size = bpy.data.images.get(name), texture.shape[1::-1]
             if image is None:
                 return _store_new(name, texture, bake, is_data=True)[0]
             if bake.job.receiver.tiling is None and tuple(image.size) != size and 0 not in image.size:
                 icons.scale(image, *size)
-            path = self.fill(image, bake, texture, node.image)
+            path = self.fill(image, bake, texture, own)
             if path is not None:
                 return path
         raise BakeError(
@@ -228,6 +229,9 @@ class Results:
             return
         for owner in self._other_owners(image, bake):
             if owner.material_name == target.material_name and self._covers(owner, image, bake):
+                if owner.object_name == target.object_name:
+                    text = f"The image '{image.name}' is that of both sides of '{owner.object_name}'."
+                    raise BakeError(text, "Clear Back Image in the node: the bake makes a new one.")
                 raise BakeError(
                     f"'{owner.object_name}' is baked to the same part of the image '{image.name}' by the same "
                     "material.",
@@ -278,7 +282,7 @@ def _map_of(target: Target) -> str | None:
     if obj is None:
         return None
     evaluated, node = obj.evaluated_get(bpy.context.evaluated_depsgraph_get()), node_of(target)
-    in_tiles = node is not None and uses_tiles(node)
+    in_tiles = node is not None and uses_tiles(node, target.side)
     try:
         return read_polygons(evaluated, target.material_name, None, getattr(node, "uv_map", ""), in_tiles).uv_map
     except BakeError:

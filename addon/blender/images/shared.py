@@ -45,7 +45,7 @@ def read_parts(target: Target, size: Size) -> Parts | None:
     try:
         is_tiled = isinstance(size, Tiling)
         polygons = read_polygons(evaluated, target.material_name, None, node.uv_map, is_tiled)
-        mesh = flatten(polygons, spread=spread_over_edges(node.surface()))
+        mesh = flatten(polygons, spread=spread_over_edges(node.surface()), is_sheet=node.thickness > 0)
         mesh = mesh.within(size) if is_tiled else mesh
         return parts_of(build_receiver(mesh, *(size.size if is_tiled else size))) if mesh.parts else ()
     except BakeError:

@@ -18,7 +18,7 @@ from ...core.errors import BakeError, MaterialError, ReceiverError
 from ...core.scene.flat_mesh import NO_FACES, bends
 from ...core.scene.lights import Light, WorldLight
 from ...core.scene.receiver import Grid
-from ...core.target import Target
+from ...core.target import FRONT, Target
 from ...core.time_left import duration
 from .. import compat
 from ..images.facts import is_sequence
@@ -169,8 +169,10 @@ class _SceneFacts:
         grid, obj = _grid(target, resolution), target.obj
         if grid is None or not (self.lights or self.unknown or self.world_by_cycles or self.lamps_by_cycles):
             return None
-        is_below = self._extents(grid)[1][:, 2].max() > LOW * max(obj.dimensions)
         surface = target.node.surface()
+        low, high = self._extents(grid)
+        reach = max(high[:, 2].max(), -low[:, 2].min() * (surface.thickness > 0))
+        is_below = reach > LOW * max(obj.dimensions)
         is_textured = target.node.has_texture()
         finders = Finders(
             bounced=is_below,
@@ -211,7 +213,7 @@ def _shape(target: BakeTarget, depsgraph) -> tuple[float, bool, BakeError | None
     if len(obj.data.polygons) > MAX_FACES:
         return max(obj.dimensions), True, None
     evaluated, node = obj.evaluated_get(depsgraph), target.node
-    is_tiled = uses_tiles(node)
+    is_tiled = uses_tiles(node, target.side)
 
     surface = node.surface()
     try:
@@ -263,7 +265,8 @@ def _grid(target: BakeTarget, resolution: int) -> Grid | None:
     origin = low[0] * np.array(x_axis) + low[1] * np.array(y_axis) + height * np.array(normal)
     whole = np.broadcast_to(np.float32(1), (rows, columns))
     axes = tuple(x_axis), tuple(y_axis), tuple(normal)
-    return Grid(tuple(origin.tolist()), *axes, *map(float, sides / [columns, rows]), columns, rows, whole)
+    grid = Grid(tuple(origin.tolist()), *axes, *map(float, sides / [columns, rows]), columns, rows, whole)
+    return grid if target.side == FRONT else grid.flipped()
 
 
 def line_of(announced: dict[Target, Announced], targets: Iterable[Target]) -> str:

@@ -10,11 +10,11 @@ import numpy as np
 from ...core.bake.margin import part_in_shared
 from ...core.live.framed_receiver import FramedReceiver
 from ...core.live.renderer import Rendering
-from ...core.target import Target
+from ...core.target import BACK, Target
 from ..images import files, icons
 from ..node.find import find_node
-from ..node.node import all_nodes, own_tree
-from ..node.tree import IMAGE, show_image, show_map_for_now, show_own_image
+from ..node.node import all_nodes, image_of_side, own_tree
+from ..node.tree import IMAGE, show_images, show_map_for_now, show_own_images_in, shown_images
 
 NAME = ".Beamspread Live"  # the dot hides it in menus
 
@@ -24,7 +24,7 @@ SINGLE = "FILE", "GENERATED"
 
 
 class Preview:
-    """The light of all targets of one material, over the pixels of the node's own image.
+    """The light of all targets of one side of a material, over the pixels of the node's own image of that side.
 
     Undo and deleted data may take the hidden image away at any time, so it is looked up by its name; `place` makes
     it anew from the pixels here. Methods that show something need `fits`.
@@ -36,8 +36,9 @@ class Preview:
     tree_name : name of the inner tree that shows the preview.
     """
 
-    def __init__(self, material_name: str, size: tuple[int, int]) -> None:
+    def __init__(self, material_name: str, side: str, size: tuple[int, int]) -> None:
         self.size = size
+        self._side = side
         self.parts: dict[Target, FramedReceiver] = {}
         self._masks: dict[Target, np.ndarray] = {}  # bool (height, width), texels that each target fills
         self.tree_name = ""
@@ -53,16 +54,18 @@ class Preview:
 
     def is_shown(self) -> bool:
         """True if the node's inner tree shows the preview."""
-        tree = getattr(self._node(), "node_tree", None)
-        image = None if tree is None else tree.nodes[IMAGE].image
+        node = self._node()
+        image = None if node is None or node.node_tree is None else self._shown_in(node)
         return image is not None and image.name == self._name and image.has_data
 
     def fits(self) -> bool:
         """True if the node is still there and its own image has no other size."""
         node = self._node()
-        image = getattr(node, "image", None)
+        if node is None or node.node_tree is None or self._side not in node.sides():
+            return False
+        image = image_of_side(node, self._side)
         if image is None:
-            return node is not None and node.node_tree is not None
+            return True
         return image.source in SINGLE and tuple(image.size) in (self.size, (0, 0))
 
     def show(self, rendering: Rendering) -> None:
@@ -86,9 +89,16 @@ class Preview:
             image.pixels.foreach_set(self._pixels.ravel())
             image.update()
             self._is_new_to_cycles = True
-        if node.node_tree.nodes[IMAGE].image != image:
+        if self._shown_in(node) != image:
             tree = own_tree(node)
-            show_image(tree, image)
+            front, back = shown_images(tree)
+            if len(node.sides()) == 1:
+                front = back = image
+            elif self._side == BACK:
+                front, back = front or image, image
+            else:
+                front, back = image, back or image
+            show_images(tree, front, back)
             self.tree_name = tree.name
         show_map_for_now(node.node_tree, self._uv_map)
 
@@ -123,7 +133,8 @@ class Preview:
         spaces = (space for screen in bpy.data.screens for area in screen.areas for space in area.spaces)
         for space in spaces:
             if space.type == "IMAGE_EDITOR" and space.image is not None and space.image.name in names:
-                space.image = getattr(self._node(), "image", None)
+                node = self._node()
+                space.image = None if node is None else image_of_side(node, self._side)
 
     def remove(self) -> None:
         """Hide the preview and remove its hidden images."""
@@ -156,6 +167,11 @@ class Preview:
                     np.maximum(side, its.receiver.coverage, out=side)
             self._masks[target] = part_in_shared(framed.receiver.coverage, before, after, framed.margin)
 
+    def _shown_in(self, node):
+        """The image that the node's inner tree shows on the preview's side."""
+        front, back = shown_images(node.node_tree)
+        return back if self._side == BACK else front
+
     def _node(self):
         return find_node(bpy.data.materials.get(self._material_name))
 
@@ -163,7 +179,7 @@ class Preview:
         outside = ~np.any([framed.region for framed in self.parts.values()], axis=0)
         if not outside.any():
             return
-        image = self._node().image
+        image = image_of_side(self._node(), self._side)
         has_pixels = image is not None and tuple(image.size) == self.size
         self._pixels[outside, :3] = files.linear_pixels(image)[outside] if has_pixels else 0
 
@@ -183,9 +199,8 @@ def _show_own_images(names: Collection[str]) -> None:
         tree = node.node_tree
         if tree is None or tree.library is not None or IMAGE not in tree.nodes:
             continue
-        image = tree.nodes[IMAGE].image
-        if image is not None and image.name in names:
-            show_own_image(tree, node.image)
+        if any(image is not None and image.name in names for image in shown_images(tree)):
+            show_own_images_in(tree, node)
 
 
 def _remove(names: Collection[str]) -> None:

@@ -27,6 +27,7 @@ from ..images.files import check_image
 from ..images.results import check_editable
 from ..images.udim import is_tiled
 from ..node.find import find_bakeable, find_node, find_node_in_groups, medium_of, node_of
+from ..node.node import image_of_side
 from ..read.base_color import read_texture
 from ..read.geometry import mesh_key, read_polygons
 from ..read.lights import read_illumination, with_lamps
@@ -75,11 +76,11 @@ class Reader:
         self._live_targets: dict[Target, LiveTarget] = {}
 
     def read(
-        self, depsgraph, changes: SceneChanges, sizes: Mapping[str, tuple[int, int]] | None = None
+        self, depsgraph, changes: SceneChanges, sizes: Mapping[tuple, tuple[int, int]] | None = None
     ) -> list[LiveTarget]:
         """The targets to render, in this order; unchanged ones are the same objects as before.
 
-        `sizes` has the image size of materials that several targets share and whose node has no image.
+        `sizes` has the size of images that nodes lack and several targets share, by `Target.image_key`.
         """
         bounces = depsgraph.scene.original.beamspread.use_indirect
         is_known = self._illumination is not None and bounces == self._bounces
@@ -93,8 +94,8 @@ class Reader:
         if changes or not is_known or self._sky_time != self._sky.time:
             self._light_sky(depsgraph)
             self._note_left_out(depsgraph)
-        users = Counter(target.material_name for target in self.targets)
-        shared = {name: size for name, size in (sizes or {}).items() if users[name] > 1}
+        users = Counter(target.image_key for target in self.targets)
+        shared = {key: size for key, size in (sizes or {}).items() if users[key] > 1}
         self.errors, self._colors, targets = dict(self._unreadable), {}, {}
         for target in self.targets[:MAX_TARGETS]:
             live_target = self._live_target(depsgraph, target, shared)
@@ -174,7 +175,7 @@ class Reader:
             names.append(f"{len(self.targets) - MAX_TARGETS} objects farther away")
         self.left_out = names
 
-    def _live_target(self, depsgraph, target: Target, sizes: Mapping[str, tuple[int, int]]) -> LiveTarget | None:
+    def _live_target(self, depsgraph, target: Target, sizes: Mapping[tuple, tuple[int, int]]) -> LiveTarget | None:
         """The former object unless something has changed, such as values of nodes and settings; None after errors."""
         material = bpy.data.materials.get(target.material_name)
         node = find_node(material)
@@ -184,7 +185,7 @@ class Reader:
         if target.object_name not in self._lighting:
             self._lighting[target.object_name] = self._lit.lighting(target.object_name)
         try:
-            size = _image_size(material, node.image) or sizes.get(target.material_name)
+            size = _image_size(material, image_of_side(node, target.side)) or sizes.get(target.image_key)
             side = self._side(target, node, settings)
             color = self._base_color(depsgraph, target, size or side)
             spread = spread_over_edges(node.surface())
@@ -261,7 +262,8 @@ def _blurred(color: BaseColor, blur: float) -> BaseColor:
 
 
 def _receiver(polygons: Polygons, size: Size, surface: Surface) -> Receiver:
-    mesh = flatten(polygons, min(surface.material.mean_free_path), spread=spread_over_edges(surface))
+    path, spread, is_sheet = min(surface.material.mean_free_path), spread_over_edges(surface), surface.thickness > 0
+    mesh = flatten(polygons, path, spread=spread, is_sheet=is_sheet)
     width, height = texture_size(mesh, size) if isinstance(size, int) else size
     shrink = min(1.0, MAX_TEXELS / max(width, height))
     return build_receiver(mesh, max(1, round(width * shrink)), max(1, round(height * shrink)))

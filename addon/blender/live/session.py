@@ -15,6 +15,7 @@ from ..cycles.sky import SkyService
 from ..images.facts import ImageFacts, facts_of, owners_of
 from ..jobs.state import redraw, state
 from ..node.find import find_node
+from ..node.node import image_of_side
 from ..read.scene_cache import scene_cache
 from ..read.scene_changes import SceneChanges
 from .preview import Preview
@@ -31,6 +32,9 @@ CALM_SECONDS = 0.3
 
 CYCLES_PAUSE_SECONDS = 1.0
 """Seconds between two previews for Cycles while renderings are still to come; more restarts it less often."""
+
+ImageKey = tuple[str, str]
+"""Name of a material and a side, see `Target.image_key`."""
 
 MAX_OVERLAP = 0.5
 """Overlap (fraction of texels) above which two objects collide in one preview; margins overlap less."""
@@ -49,11 +53,11 @@ class Session:
         self._reader = Reader(self._sky)
         self._time: int | None = None  # of the last scan, as the cache counts it
         self._targets: list[LiveTarget] = []
-        self._previews: dict[str, Preview] = {}  # by material
+        self._previews: dict[ImageKey, Preview] = {}
         self._errors: dict[Target, str] = {}
         self._notes: dict[Target, tuple[Message, ...]] = {}  # of the last rendering
-        self._facts: dict[str, tuple[int, ImageFacts]] = {}  # address and facts of the image in each material's node
-        self._sizes: dict[tuple, tuple[int, int]] = {}  # of previews without an image, by material and resolution
+        self._facts: dict[ImageKey, tuple[int, ImageFacts]] = {}  # address and facts of each image in nodes
+        self._sizes: dict[tuple, tuple[int, int]] = {}  # of previews without an image, by key and resolution
         self._targets_at_bake: list[LiveTarget] | None = None
         self._is_resting = self._was_changed = False
         self._scan_seconds = 1.0  # of the last scan of more than lamps
@@ -78,8 +82,8 @@ class Session:
 
     def recover(self) -> None:
         """Read everything again and make previews anew after undo, which replaces any data."""
-        undone = {name for name, (_address, facts) in self._facts.items() if _facts_of(name)[1] != facts}
-        self._thread.forget([target for target in self._reader.targets if target.material_name in undone])
+        undone = {key for key, (_address, facts) in self._facts.items() if _facts_of(key)[1] != facts}
+        self._thread.forget([target for target in self._reader.targets if target.image_key in undone])
         self._facts.clear()
         self._reader, self._time = Reader(self._sky), None
         for preview in self._previews.values():
@@ -190,7 +194,7 @@ class Session:
         start = time.perf_counter()
         changes = self._changes()
         resolution = depsgraph.scene.original.beamspread.resolution
-        sizes = {name: size for (name, wanted), size in self._sizes.items() if wanted == resolution}
+        sizes = {key: size for (key, wanted), size in self._sizes.items() if wanted == resolution}
         targets = self._read(depsgraph, changes, sizes)
         if changes and not changes.is_lamps_alone():
             self._scan_seconds = time.perf_counter() - start
@@ -210,33 +214,33 @@ class Session:
         """Leave nodes that show a new bake alone until the scene changes from that which the bake has read."""
         targets, self._targets_at_bake = self._targets_at_bake, None
         baked = set()
-        for name in {target.material_name for target in self._reader.targets}:
-            (address, facts), preview = _facts_of(name), self._previews.get(name)
-            former_address, former = self._facts.get(name, (address, facts))
+        for key in {target.image_key for target in self._reader.targets}:
+            (address, facts), preview = _facts_of(key), self._previews.get(key)
+            former_address, former = self._facts.get(key, (address, facts))
             # A copy of the image in a node, as Make Float puts there, has the same bakes.
             is_new = facts != former and (address == former_address or facts.bakes != former.bakes)
             if is_new and facts.bakes and (preview is None or not preview.is_shown()):
-                baked.add(name)
-            self._facts[name] = address, facts
+                baked.add(key)
+            self._facts[key] = address, facts
         if not baked:
             return
         if targets is None:
             targets = self._read_all(context.evaluated_depsgraph_get())
-        adopted = [target for target in targets if target.target.material_name in baked]
+        adopted = [target for target in targets if target.target.image_key in baked]
         self._thread.adopt(adopted)
         for target in adopted:
             self._errors.pop(target.target, None)
-        for name in baked & set(self._previews):
-            self._previews.pop(name).remove()
+        for key in baked & set(self._previews):
+            self._previews.pop(key).remove()
 
     def _keep_previews(self, had_rest: bool) -> None:
         """Show all previews whose targets are still there, and remove the others."""
         known = set(self._reader.targets)
-        for name, preview in list(self._previews.items()):
+        for key, preview in list(self._previews.items()):
             gone = set(preview.parts) - known
             if gone == set(preview.parts) or not preview.fits():
                 self._thread.forget(set(preview.parts))
-                self._previews.pop(name).remove()
+                self._previews.pop(key).remove()
             elif gone:
                 self._thread.forget(gone)
                 preview.drop(gone)
@@ -262,9 +266,9 @@ class Session:
     def _show(self, rendering: Rendering) -> bool:
         """Show one rendering; False if its node has changed meanwhile, or another object is in its place."""
         target, size = rendering.target, rendering.texture.shape[1::-1]
-        preview = self._previews.get(target.material_name)
+        preview = self._previews.get(target.image_key)
         if preview is None or preview.size != size:
-            preview = Preview(target.material_name, size)
+            preview = Preview(*target.image_key, size)
         if not preview.fits():
             return False
         covering = self._covered_by(rendering)
@@ -274,19 +278,19 @@ class Session:
                 "give this object a material of its own."
             )
             return False
-        former = self._previews.get(target.material_name)
+        former = self._previews.get(target.image_key)
         if former is not None and former is not preview:
             former.remove()
-        self._previews[target.material_name] = preview
+        self._previews[target.image_key] = preview
         preview.show(rendering)
-        if _image_of(target.material_name) is None:
-            self._sizes.setdefault((target.material_name, bpy.context.scene.beamspread.resolution), size)
+        if _image_of(target.image_key) is None:
+            self._sizes.setdefault((target.image_key, bpy.context.scene.beamspread.resolution), size)
         return True
 
     def _covered_by(self, rendering: Rendering) -> Target | None:
         """Another target of the same preview with the same texels: one with a bake there, else the first by name."""
         target = rendering.target
-        preview, image = self._previews.get(target.material_name), _image_of(target.material_name)
+        preview, image = self._previews.get(target.image_key), _image_of(target.image_key)
         if preview is None or len(preview.parts) < (2 if target in preview.parts else 1):
             return None
         owners = owners_of(image) if image is not None else []
@@ -328,14 +332,16 @@ class Session:
         return self.names() | trees | {image.name for image in images}
 
 
-def _image_of(material_name: str):
-    """The image in the node of a material, or None."""
-    return getattr(find_node(bpy.data.materials.get(material_name)), "image", None)
+def _image_of(key: ImageKey):
+    """The image of a side in the node of a material, or None."""
+    material_name, side = key
+    node = find_node(bpy.data.materials.get(material_name))
+    return None if node is None else image_of_side(node, side)
 
 
-def _facts_of(material_name: str) -> tuple[int, ImageFacts]:
-    """Address and facts of the image in the node of a material."""
-    image = _image_of(material_name)
+def _facts_of(key: ImageKey) -> tuple[int, ImageFacts]:
+    """Address and facts of the image of a side in the node of a material."""
+    image = _image_of(key)
     return (0, ImageFacts()) if image is None else (image.as_pointer(), facts_of(image))
 
 

@@ -11,6 +11,7 @@ from ...core.bake.pace import Estimate
 from ...core.bake.steps import to_simulate
 from ...core.errors import BakeError
 from ...core.ldf.library import SIMULATING
+from ...core.target import BACK, FRONT
 from ...core.time_left import duration
 from .output import former_output, has_plain, is_in_group, is_shown
 from .path import meters_per_unit
@@ -64,10 +65,15 @@ def draw_properties(node, layout) -> None:
     layout.prop(node, "is_infinite")
     if not node.is_infinite:
         layout.prop(node, "thickness")
+        layout.prop(node, "side")
     if line := new_medium_line(node):
         layout.label(text=line, icon="TIME")
     layout.prop(node, "edges")
-    layout.template_ID(node, "image", new="image.new", open="image.open")
+    sides = node.sides()
+    for side, name in ((FRONT, "image"), (BACK, "image_back")):
+        if side in sides:
+            text = side.title() if len(sides) > 1 else ""
+            layout.template_ID(node, name, new="image.new", open="image.open", text=text)
     _draw_map(node, layout)
     _draw_actions(node, layout)
 
@@ -131,9 +137,9 @@ def _draw_actions(node, layout) -> None:
     if is_shown(node):
         if former_output(node) is not None:
             column.operator("beamspread.toggle_result", text="Show Former Shader", icon="LOOP_BACK")
-    elif node.image is not None and not is_in_group(node):
+    elif any(node.shown_images()) and not is_in_group(node):
         column.operator("beamspread.toggle_result", text="Show Baked Result", icon="IMAGE_DATA")
-    if node.image is not None:
+    if any(node.shown_images()):
         if has_plain(node):
             column.operator("beamspread.make_plain", text="Remove Plain Nodes", icon="NODETREE")
         else:

@@ -10,11 +10,11 @@ import bpy
 from ...core.bake.runner import Bake
 from ...core.bake.surface import Surface
 from ...core.errors import BakeError
-from ...core.target import Target
+from ...core.target import FRONT, Target
 from .. import compat
 from ..read.nodes import InputSocket
 from ..read.visibility import count_instances, render_visible_names, with_instanced
-from .node import BeamspreadNode
+from .node import BeamspreadNode, image_of_side
 from .output import is_linked
 
 
@@ -25,26 +25,29 @@ class BakeTarget:
     Attributes
     ----------
     groups : group nodes around the node, outermost first.
+    side : the face that the image shows, `FRONT` or `BACK`.
     """
 
     obj: object
     material: object
     node: object
     groups: tuple
+    side: str = FRONT
 
     @property
     def name(self) -> Target:
-        return Target(self.obj.name, self.material.name)
+        return Target(self.obj.name, self.material.name, self.side)
 
     @property
     def image(self):
-        """The node's image among the original data, or None."""
-        return self.node.image and self.node.image.original
+        """The node's image of this side among the original data, or None."""
+        image = image_of_side(self.node, self.side)
+        return image and image.original
 
     def was_baked_elsewhere(self) -> bool:
         """True if the material belongs to another file and shows the image that was baked there."""
         is_local = self.material.library is None and self.material.override_library is None
-        return not is_local and self.node.image is not None
+        return not is_local and self.image is not None
 
 
 NOTHING_FOUND = BakeError("No mesh has a material with a Beamspread node.", "Add one in the Shader Editor.")
@@ -62,16 +65,15 @@ def node_of(target: Target):
 
 
 def image_of(target: Target):
-    """The image of the target's node, or None."""
+    """The image of the target in its node, or None."""
     node = node_of(target)
-    return None if node is None else node.image
+    return None if node is None else image_of_side(node, target.side)
 
 
-def uses_tiles(node) -> bool:
-    """True if the node's image has UDIM tiles, or will have them."""
-    if node.image is None:
-        return bpy.context.scene.beamspread.use_udim
-    return node.image.source == "TILED"
+def uses_tiles(node, side: str = FRONT) -> bool:
+    """True if the node's image of a side has UDIM tiles, or will have them."""
+    image = image_of_side(node, side)
+    return bpy.context.scene.beamspread.use_udim if image is None else image.source == "TILED"
 
 
 def find_node_in_groups(material) -> tuple | None:
@@ -113,10 +115,11 @@ def _has_one_user(group) -> bool:
 
 
 def targets_of(obj) -> list[BakeTarget]:
-    """The targets of an object: its materials that have a Beamspread node, each once."""
+    """The targets of an object: its materials that have a Beamspread node, each once for each side with an image."""
     materials = _all_materials(obj) if obj.type == "MESH" else ()
-    nodes = ((material, find_node_in_groups(material)) for material in materials)
-    return [BakeTarget(obj, material, *node) for material, node in nodes if node is not None]
+    places = ((material, find_node_in_groups(material)) for material in materials)
+    found = [(material, *place) for material, place in places if place is not None]
+    return [BakeTarget(obj, material, node, groups, side) for material, node, groups in found for side in node.sides()]
 
 
 def find_targets(objects: Iterable) -> list[Target]:
@@ -167,7 +170,7 @@ def has_node(objects: Iterable) -> bool:
 def _misplaced(obj, with_images: bool) -> Iterator[tuple]:
     for material in _all_materials(obj):
         node = find_node(material)
-        is_wanted = node is not None and (node.image is None or (with_images and material.library is None))
+        is_wanted = node is not None and (not any(node.shown_images()) or (with_images and material.library is None))
         if is_wanted and obj.type != "MESH":
             yield material, BakeError(f"'{obj.name}' is not a mesh.", "Convert it to one (Object > Convert > Mesh).")
         if node is None and compat.uses_nodes(material):

@@ -9,6 +9,7 @@ from ...core.bake.surface import MIRROR, OPEN, Surface
 from ...core.errors import MaterialError
 from ...core.material import Material
 from ...core.messages import Message
+from ...core.target import BACK, FRONT
 from .. import compat, preferences
 from ..read.nodes import InputSocket
 from ..registration import all_or_nothing, handlers
@@ -46,6 +47,10 @@ from .tree import (
     upgrade,
 )
 
+BOTH = "BOTH"
+SIDES = {FRONT: (FRONT,), BACK: (BACK,), BOTH: (FRONT, BACK)}
+"""Faces that get an image, by the property `side`."""
+
 NEW_ROUGHNESS = 0.4
 """Roughness of the coat of new nodes. Smaller: sharper reflections, as of wet surfaces."""
 
@@ -80,9 +85,9 @@ def _color_edited(mode: str):
     return edited
 
 
-def _thickness_edited(node, _context) -> None:
+def _thickness_edited(node, context) -> None:
     note_medium(node)
-    _show_color(node)
+    _show(node, context)
 
 
 def _mode_edited(node, _context) -> None:
@@ -101,7 +106,7 @@ def _ior_edited(node, context) -> None:
 
 def _show_color(node) -> None:
     """Show the color of the node if it has no image yet."""
-    if node.image is not None or BASE_COLOR not in node.inputs:
+    if any(node.shown_images()) or BASE_COLOR not in node.inputs:
         return
     color = np.array((*node.visible_color(), 1.0), np.float32)
     if not np.array_equal(node.inputs[BASE_COLOR].default_value, color):
@@ -114,22 +119,32 @@ def _map_edited(node, _context) -> None:
 
 
 def _show(node, _context) -> None:
-    """Bring image and IOR into the node's inner tree."""
+    """Bring images and IOR into the node's inner tree."""
     tree = own_tree(node)
     if tree is not None:
-        show_values(tree, node.image, node.ior)
+        show_values(tree, *node.shown_images(), node.ior)
         _show_color(node)
     plain.refresh(node.image, node)
 
 
-def link_result(node, image, uv_map: str | None = None) -> list[Message]:
+def image_of_side(node, side: str):
+    """The node's image of a side, or None."""
+    return node.image_back if side == BACK else node.image
+
+
+def set_image(node, image, side: str) -> None:
+    """Give the node an image of a side."""
+    setattr(node, "image_back" if side == BACK else "image", image)
+
+
+def link_result(node, image, uv_map: str | None = None, side: str = FRONT) -> list[Message]:
     """Show `image` in the node, and the node at its material's output; messages as of `link_output`.
 
     `uv_map` is the name of the map that shows it, "" for the one that renders; None: as before.
     """
     if node.node_tree is None:
         node.node_tree = make_inner_tree()
-    node.image = image
+    set_image(node, image, side)
     _show(node, None)
     if uv_map is not None:
         keep_map(node.node_tree, uv_map)
@@ -225,6 +240,17 @@ class BeamspreadNode(ColorProperties, PathProperties, bpy.types.ShaderNodeCustom
         step=0.001,
         update=_thickness_edited,
     )
+    side: EnumProperty(
+        name="Side",
+        description="Faces of a thin material that get an image. Light on both faces counts in each",
+        items=(
+            (FRONT, "Front", "The face that normals point out of", 0),
+            (BACK, "Back", "The other face", 1),
+            (BOTH, "Both", "Each face has its own image", 2),
+        ),
+        default=FRONT,
+        update=_show,
+    )
     edges: EnumProperty(
         name="Edges",
         description="What the edges of a plane do with light inside the material",
@@ -237,6 +263,12 @@ class BeamspreadNode(ColorProperties, PathProperties, bpy.types.ShaderNodeCustom
     image: PointerProperty(
         name="Image",
         description="Image that the bake fills. Empty: a new image is created",
+        type=bpy.types.Image,
+        update=_show,
+    )
+    image_back: PointerProperty(
+        name="Back Image",
+        description="Image of the back that the bake fills. Empty: a new image is created",
         type=bpy.types.Image,
         update=_show,
     )
@@ -295,6 +327,16 @@ class BeamspreadNode(ColorProperties, PathProperties, bpy.types.ShaderNodeCustom
         )
         base_color = tuple(map(_decimal, self.base_color)) if color_mode == BASE_COLOR_MODE else None
         return Surface(material, _decimal(self.thickness), base_color, self.edges)
+
+    def sides(self) -> tuple[str, ...]:
+        """Faces that get an image; a material that is infinitely thick has one."""
+        return SIDES[self.side] if self.thickness > 0 else (FRONT,)
+
+    def shown_images(self) -> tuple:
+        """Images that the material shows on its front and on its back; equal where there is one, or None."""
+        images = [image_of_side(self, side) for side in self.sides()]
+        images = [image for image in images if image is not None] or [None]
+        return images[0], images[-1]
 
     def visible_color(self) -> list[float]:
         """Color in white, uniform light, 0 to 1; the base color if the values are out of range."""

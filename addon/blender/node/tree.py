@@ -8,7 +8,7 @@ from ..read.nodes import INNER_TREE, OWN_NODE
 
 NAME = INNER_TREE
 BASE_COLOR, ROUGHNESS, NORMAL = "Base Color", "Roughness", "Normal"
-IMAGE, FRESNEL, COAT, GLOSSY = "Image", "Fresnel", "Coat", "Glossy"
+IMAGE, BACK_IMAGE, FRESNEL, COAT, GLOSSY = "Image", "Back Image", "Fresnel", "Coat", "Glossy"
 FACING, UV_MAP = "Facing", "UV Map"
 INPUT, EMISSION, UNSEEN, TOTAL, OUTPUT = "Input", "Emission", "Unseen", "Total", "Output"
 BAKED = "Is Baked"
@@ -113,7 +113,7 @@ def _show_unbaked(tree) -> None:
     link(color.inputs[0], tree.nodes[IMAGE].outputs["Color"])
     link(color.inputs[1], baked.outputs[0])
     link(tree.nodes[OUTPUT].inputs["Color"], color.outputs[0])
-    show_image(tree, tree.nodes[IMAGE].image)
+    show_images(tree, *shown_images(tree))
 
 
 def _normal_or_plain(tree, given):
@@ -137,9 +137,9 @@ def _normal_or_plain(tree, given):
     return total.outputs[0]
 
 
-def show_values(tree, image, ior: float) -> None:
-    """Bring an image and an index of refraction into the tree."""
-    show_image(tree, image)
+def show_values(tree, front, back, ior: float) -> None:
+    """Bring images and an index of refraction into the tree."""
+    show_images(tree, front, back)
     show_ior(tree, ior)
 
 
@@ -150,14 +150,50 @@ def show_ior(tree, ior: float) -> None:
     tree.nodes[COAT].inputs[1].default_value = 1.0 if ior > 1 else 0.0
 
 
-def show_image(tree, image) -> None:
-    """Show an image in the tree, or the base color without one."""
-    if tree.nodes[IMAGE].image != image:
-        tree.nodes[IMAGE].image = image
+def show_images(tree, front, back) -> None:
+    """Show an image on the front and one on the back of faces, or the base color without any."""
+    if front != back and BACK_IMAGE not in tree.nodes:
+        _add_back(tree)
+    _show_in(tree.nodes[IMAGE], front)
+    if BACK_IMAGE in tree.nodes:
+        _show_in(tree.nodes[BACK_IMAGE], back)
     baked = tree.nodes[BAKED].outputs[0] if BAKED in tree.nodes else None
-    is_baked = float(image is not None)
+    is_baked = float(front is not None)
     if baked is not None and baked.default_value != is_baked:
         baked.default_value = is_baked
+
+
+def shown_images(tree) -> tuple:
+    """Images that the tree shows on the front and on the back of faces; equal where there is one, or None."""
+    front = tree.nodes[IMAGE].image
+    return front, tree.nodes[BACK_IMAGE].image if BACK_IMAGE in tree.nodes else front
+
+
+def _show_in(node, image) -> None:
+    if node.image != image:
+        node.image = image
+
+
+def _add_back(tree) -> None:
+    """Choose between the image and one of the back by the side that is seen, wherever the image is linked."""
+    image, link = tree.nodes[IMAGE], tree.links.new
+    readers = [wire.to_socket for wire in image.outputs["Color"].links]
+    back = _add(tree, "ShaderNodeTexImage", BACK_IMAGE, (-600, 700))
+    back.extension = image.extension
+    if image.inputs["Vector"].is_linked:
+        link(back.inputs["Vector"], image.inputs["Vector"].links[0].from_socket)
+    geometry = _add(tree, "ShaderNodeNewGeometry", "Seen Side", (-600, 1000))
+    difference = _add(tree, "ShaderNodeVectorMath", "Back or Front", (-400, 700))
+    difference.operation = "SUBTRACT"
+    side = _add(tree, "ShaderNodeVectorMath", "Side", (-200, 700))
+    side.operation = "MULTIPLY_ADD"
+    link(difference.inputs[0], back.outputs["Color"])
+    link(difference.inputs[1], image.outputs["Color"])
+    link(side.inputs[0], difference.outputs[0])
+    link(side.inputs[1], geometry.outputs["Backfacing"])
+    link(side.inputs[2], image.outputs["Color"])
+    for reader in readers:
+        link(reader, side.outputs[0])
 
 
 def show_map(tree, name: str) -> None:
@@ -174,7 +210,9 @@ def show_map(tree, name: str) -> None:
         node = None
     if node is None:
         node = _add(tree, f"ShaderNode{kind}", UV_MAP, (-800, 0))
-        tree.links.new(tree.nodes[IMAGE].inputs["Vector"], node.outputs[output])
+        for image in (IMAGE, BACK_IMAGE):
+            if image in tree.nodes:
+                tree.links.new(tree.nodes[image].inputs["Vector"], node.outputs[output])
     if getattr(node, attribute) != name:
         setattr(node, attribute, name)
 
@@ -186,7 +224,7 @@ def keep_map(tree, name: str) -> None:
 
 
 def show_map_for_now(tree, name: str) -> None:
-    """Show the image by the UV map of that name until `show_own_image`."""
+    """Show the image by the UV map of that name until `show_own_images_in`."""
     node = tree.nodes.get(UV_MAP)
     shown = "" if node is None else getattr(node, "uv_map", None) or getattr(node, "attribute_name", "")
     if name != shown:
@@ -194,18 +232,20 @@ def show_map_for_now(tree, name: str) -> None:
         show_map(tree, name)
 
 
-def show_own_image(tree, image) -> None:
-    """Show the image of the tree's node, by the UV map of its bake."""
-    show_image(tree, image)
+def show_own_images_in(tree, node) -> None:
+    """Show the images of the tree's node, by the UV map of their bakes."""
+    show_images(tree, *node.shown_images())
     if FORMER_MAP in tree:
         keep_map(tree, tree[FORMER_MAP])
 
 
-def follow_frames(tree, first: int, last: int) -> None:
-    """Have the tree's image, a sequence, follow the scene's frame from the first to the last file."""
-    user = tree.nodes[IMAGE].image_user
-    user.frame_start, user.frame_duration, user.frame_offset = first, last - first + 1, first - 1
-    user.use_auto_refresh = True
+def follow_frames(tree, image, first: int, last: int) -> None:
+    """Have nodes of the tree that show this image, a sequence, follow the scene's frame from the first to the last."""
+    for name in (IMAGE, BACK_IMAGE):
+        if name in tree.nodes and tree.nodes[name].image == image:
+            user = tree.nodes[name].image_user
+            user.frame_start, user.frame_duration, user.frame_offset = first, last - first + 1, first - 1
+            user.use_auto_refresh = True
 
 
 def _add(tree, kind: str, name: str, location: tuple[int, int]):
@@ -273,7 +313,7 @@ def release_images() -> None:
     for node in all_nodes():
         tree = node.node_tree
         if tree is not None and tree.library is None and IMAGE in tree.nodes:
-            show_image(tree, None)
+            show_images(tree, None, None)
 
 
 @persistent
@@ -282,7 +322,7 @@ def show_own_images(*_arguments) -> None:
     for node in all_nodes():
         tree = node.node_tree
         if tree is not None and tree.library is None and IMAGE in tree.nodes:
-            show_own_image(tree, node.image)
+            show_own_images_in(tree, node)
 
 
 @persistent

@@ -6,7 +6,7 @@ import bpy
 
 from .. import compat
 from ..images.files import clips
-from ..images.image_operators import image_in, wanted_size
+from ..images.image_operators import images_in, wanted_size
 from ..images.udim import is_tiled
 from ..jobs.run.active_image import active_image, refusals
 from ..jobs.run.engine import BeamspreadEngine
@@ -25,18 +25,19 @@ def _use_columns(layout) -> None:
 
 def draw_image_buttons(layout, context) -> None:
     """Draw Make Float if the node's image clips, and Resize if its size differs from that wanted."""
-    image = image_in(context)
-    if image is None or 0 in image.size or image.library is not None or is_tiled(image):
-        return
-    if clips(image):
+    images = [image for image in images_in(context) if image.library is None and not is_tiled(image)]
+    images = [image for image in images if 0 not in image.size]
+    if any(map(clips, images)):
         layout.operator("beamspread.make_float", text="Make Float: image clips values above 1", icon="IMAGE_DATA")
-    side = _wanted_side(image, context.scene.beamspread)
-    size = wanted_size(image.size, side)
-    if tuple(image.size) != size:
-        text = f"Resize {image.size[0]} x {image.size[1]} to {size[0]} x {size[1]}"
-        resize = layout.operator("beamspread.resize_image", text=text, icon="FULLSCREEN_ENTER")
-        if context.scene.beamspread.use_size:
-            resize.side = side
+    for image in images:
+        side = _wanted_side(image, context.scene.beamspread)
+        size = wanted_size(image.size, side)
+        if tuple(image.size) != size:
+            text = f"Resize {image.size[0]} x {image.size[1]} to {size[0]} x {size[1]}"
+            resize = layout.operator("beamspread.resize_image", text=text, icon="FULLSCREEN_ENTER")
+            if context.scene.beamspread.use_size:
+                resize.side = side
+            return  # it resizes all that need it
 
 
 def _wanted_side(image, settings) -> int:

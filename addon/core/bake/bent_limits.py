@@ -18,7 +18,7 @@ def bent_messages(name: str, surface: Surface, settings: BakeSettings, beyond: f
         messages.append(note(name, text, "Set Margin Type to Extend."))
     if settings.layer != COMBINED:
         return messages
-    if beyond > MAX_BEYOND:
+    if beyond > MAX_BEYOND and not surface.thickness:
         bends = "bends more than its medium is known for: light there is approximate"
         text = f"{beyond:.0%} of the surface of '{name}' {bends}."
         messages.append(note(name, text, "A shorter Mean Free Path, or a larger object, bends less."))
@@ -26,7 +26,7 @@ def bent_messages(name: str, surface: Surface, settings: BakeSettings, beyond: f
         text = f"The LDF samples know flat surfaces alone, so light in '{name}' spreads as if it did not bend."
         messages.append(note(name, text, "Set Distributions to Library."))
     elif surface.thickness > 0:
-        text = f"'{name}' is a slab that bends. Light in it spreads as in a flat slab"
+        text = f"'{name}' is a sheet that bends. Light in it spreads as in a flat one"
         mirrored = ", without light that its far face mirrors before it scatters" if surface.material.ior > 1 else ""
-        messages.append(note(name, f"{text}{mirrored}.", "Set Thickness to 0 for a solid body."))
+        messages.append(note(name, f"{text}{mirrored}."))
     return messages

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -11,9 +11,9 @@ import numpy as np
 from ..messages import note, warning
 from ..native import native
 from ..progress import Progress
+from ..scene.bent_grid import AnyGrid, BentGrid
 from ..scene.grid import Grid
 from ..scene.lights import STRATA, BentField, Field, FieldLight
-from ..scene.receiver import Receiver
 from .estimate import bounced_seconds
 from .job import BakeJob, Step
 from .layers import WITHOUT_MEDIUM
@@ -71,13 +71,14 @@ class BouncedLight(Step):
             (light.at(grid), light.rgb().tolist(), surfaces if light.cast_shadow else None)
             for light in illumination.lights
         ]
-        nodes = bent_nodes_of(receiver, self.nodes) if receiver.is_bent else charts_of(receiver, self.nodes)
+        grids = job.lit_grids
+        nodes = bent_nodes_of(grids, self.nodes) if receiver.is_bent else charts_of(grids, self.nodes)
         bounced = native.bounced_light(
             nodes,
             STRATA,
             lights,
             surfaces,
-            direct=mean_over(receiver, lambda grid: mean_irradiance(grid, illumination)),
+            direct=mean_over(grids, lambda grid: mean_irradiance(grid, illumination)),
             tolerance=self.tolerance,
             max_bounces=self.max_bounces,
             threads=settings.threads,
@@ -87,7 +88,7 @@ class BouncedLight(Step):
         )
         if not bounced["irradiance"] > 0:
             return job
-        in_the_open = mean_over(receiver, lambda grid: mean_open_irradiance(grid, illumination.lights))
+        in_the_open = mean_over(grids, lambda grid: mean_open_irradiance(grid, illumination.lights))
         if bounced["irradiance"] < NEGLIGIBLE * in_the_open:
             return replace(job, illumination=illumination.with_messages(NOTHING_BOUNCES))
         if bounced["noise"] > NOISY * self.tolerance:
@@ -96,13 +97,12 @@ class BouncedLight(Step):
             illumination = illumination.with_messages(note(job.name, text))
         if receiver.is_bent:
             fields = tuple(
-                BentField(of_chart.positions, of_chart.normals, of_chart.spacing, radiance)
-                for of_chart, radiance in zip(nodes, bounced["radiance"])
+                BentField(of_grid.positions, of_grid.normals, of_grid.spacing, radiance, grid.is_back)
+                for grid, of_grid, radiance in zip(grids, nodes, bounced["radiance"])
             )
         else:
             fields = tuple(
-                Field(chart.grid.origin, chart.grid.normal, radiance)
-                for chart, radiance in zip(receiver.charts, bounced["radiance"])
+                Field(grid.origin, grid.normal, radiance) for grid, radiance in zip(grids, bounced["radiance"])
             )
         light = FieldLight("Bounced light", 1.0, (1.0, 1.0, 1.0), False, fields)
         return replace(job, illumination=illumination.lit_by([light]))
@@ -118,24 +118,23 @@ def _spread(job: BakeJob) -> float:
     return max(math.sqrt(math.pi * max(variance, 0.0)) * pitch, min(job.surface.material.mean_free_path))
 
 
-def mean_over(receiver: Receiver, value_of: Callable[[Grid], float]) -> float:
+def mean_over(grids: Sequence[AnyGrid], value_of: Callable[[AnyGrid], float]) -> float:
     """Mean of a value of each grid, weighted by area."""
-    grids = [chart.grid for chart in receiver.charts]
     areas = [grid.width * grid.pitch_x * grid.height * grid.pitch_y for grid in grids]
     return float(np.average([value_of(grid) for grid in grids], weights=areas))
 
 
-def bent_nodes_of(receiver: Receiver, nodes: int) -> list:
-    """The native `BentNodes` of a receiver that bends, about `nodes` x `nodes` of them."""
-    return [native.BentNodes(chart.grid.native(), nodes**2) for chart in receiver.charts]
+def bent_nodes_of(grids: Sequence[BentGrid], nodes: int) -> list:
+    """The native `BentNodes` of grids that bend, about `nodes` x `nodes` of each."""
+    return [native.BentNodes(grid.native(), nodes**2) for grid in grids]
 
 
-def charts_of(receiver: Receiver, nodes: int) -> list[dict]:
-    """Rectangles of nodes slightly above the receiver, `nodes` along its longest side, for the native tracer."""
-    sizes = [(c.grid.width * c.grid.pitch_x, c.grid.height * c.grid.pitch_y) for c in receiver.charts]
+def charts_of(grids: Sequence[Grid], nodes: int) -> list[dict]:
+    """Rectangles of nodes slightly above grids, `nodes` along the longest side, for the native tracer."""
+    sizes = [(grid.width * grid.pitch_x, grid.height * grid.pitch_y) for grid in grids]
     cell = max(*map(max, sizes), math.sqrt(sum(x * y for x, y in sizes) / MAX_SQUARES)) / nodes
     charts = []
-    for grid, size in zip((chart.grid for chart in receiver.charts), sizes):
+    for grid, size in zip(grids, sizes):
         lift = grid.clearance + LIFT * cell + 1e-6 * float(np.abs(grid.origin).max())
         charts.append(
             {

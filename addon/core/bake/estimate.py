@@ -13,7 +13,15 @@ from ..scene.bent_grid import AnyGrid, BentGrid
 from ..scene.lights import STRATA, AreaLight, Light, MeshLight, WorldLight
 from .bake_settings import BakeSettings
 from .edges import texels_with_images
-from .layers import MAX_RAYS_BY_SAMPLES, MIN_RAYS, RAYS_PER_SAMPLE, WITHOUT_MEDIUM, rays_per_texel
+from .layers import (
+    MAX_RAYS_BY_SAMPLES,
+    MIN_RAYS,
+    RAYS_PER_SAMPLE,
+    WITHOUT_MEDIUM,
+    backs_of,
+    has_back,
+    rays_per_texel,
+)
 from .mean_light import mean_open_irradiance
 from .surface import Surface
 
@@ -140,6 +148,10 @@ class Workload:
         path = max(material.mean_free_path) / max(largest.pitch_x, largest.pitch_y)
         return replace(load, path=path, ior=material.ior, thickness=paths)
 
+    def is_lit(self) -> bool:
+        """True if light may reach the grids."""
+        return bool(self.suns or self.lamps or self.broad_rays or self.narrow_rays or self.bounced)
+
     def seconds(self, settings: BakeSettings) -> float:
         """Seconds of the solution."""
         tracing = self.texels * (self._rays_of_lamps(settings) + self._rays_of_sizes())
@@ -178,6 +190,15 @@ class Workload:
         if is_wide:
             return bounced + CHOICE[is_plain] + slab * WIDE[is_plain] * self.texels
         return bounced + (slab * LAMPS[is_plain] if self.lamps else SUNS) * self.texels
+
+
+def workloads_of(
+    grids: Sequence[AnyGrid], lights: Sequence[Light], triangles: int, surface: Surface, settings: BakeSettings, *rest
+) -> list[Workload]:
+    """The workload of light on each side of the grids that counts; arguments as of `Workload.of`."""
+    sides = [grids, *([backs_of(grids)] if has_back(surface.thickness, settings) else [])]
+    loads = [Workload.of(side, lights, triangles, surface, settings, *rest) for side in sides]
+    return [load for load in loads if load.is_lit()] or loads[:1]
 
 
 def _rays(

@@ -14,11 +14,11 @@ from .estimate import (
     CYCLES_COLORS,
     CYCLES_LIGHT,
     OF_WORLD,
-    Workload,
     bounced_seconds,
     cycles_color_seconds,
     cycles_light_seconds,
     simulation_seconds,
+    workloads_of,
 )
 from .pace import Estimate
 from .steps import Solve, needs_medium, to_simulate
@@ -81,9 +81,9 @@ class Forecast:
         if bounced and finders.is_own:
             steps.append((BouncedLight.name, bounced_seconds(self.triangles, len(self.lights), threads)))
         unknown = max(self.unknown, OF_WORLD * finders.world)
-        load = Workload.of(self.grids, self.lights, self.triangles, self.surface, settings, bounced, unknown)
-        load = replace(load, is_bent=self.is_bent)
-        steps.append((Solve.kind_for(settings), load.seconds(settings)))
+        loads = workloads_of(self.grids, self.lights, self.triangles, self.surface, settings, bounced, unknown)
+        seconds = sum(replace(load, is_bent=self.is_bent).seconds(settings) for load in loads)
+        steps.append((Solve.kind_for(settings), seconds))
         return [Estimate(kind, self.name, seconds) for kind, seconds in steps]
 
     def simulations(self, settings: BakeSettings) -> dict:

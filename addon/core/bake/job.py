@@ -12,13 +12,14 @@ import numpy as np
 from ..errors import BakeError
 from ..messages import Message, warning
 from ..progress import Callback, Progress, log, timed
+from ..scene.bent_grid import AnyGrid
 from ..scene.illumination import Illumination
 from ..scene.receiver import Receiver
 from ..scene.texture import BaseColor, textured
 from .bake_settings import COMBINED, BakeSettings
 from .edges import with_edges
-from .estimate import OF_WORLD, Workload
-from .layers import WITHOUT_MEDIUM
+from .estimate import OF_WORLD, Workload, workloads_of
+from .layers import WITHOUT_MEDIUM, backs_of, has_back
 from .pace import Estimate
 from .spread import Spread
 from .surface import Surface
@@ -123,12 +124,23 @@ class BakeJob:
         """True if a step that is left may add lights."""
         return any(step.finds_light for step in self.steps)
 
-    def workload(self) -> Workload:
-        """Facts that decide how long the solution takes."""
-        grids, _ = with_edges([chart.grid for chart in self.receiver.charts], self.surface, self.name)
+    @property
+    def grids(self) -> list[AnyGrid]:
+        """Grids of the receiver."""
+        return [chart.grid for chart in self.receiver.charts]
+
+    @property
+    def lit_grids(self) -> list[AnyGrid]:
+        """Grids on which light counts: those of the receiver and, of slabs, those of the faces behind."""
+        grids = self.grids
+        return [*grids, *backs_of(grids)] if has_back(self.surface.thickness, self.settings) else grids
+
+    def workloads(self) -> list[Workload]:
+        """Facts that decide how long the solution takes, for each side from which light comes."""
+        grids, _ = with_edges(self.grids, self.surface, self.name)
         light = self.illumination
         rest = light.triangle_count, self.surface, self.settings, self.finds_light
-        return Workload.of(grids, light.lights, *rest, OF_WORLD * any(step.finds_world for step in self.steps))
+        return workloads_of(grids, light.lights, *rest, OF_WORLD * any(step.finds_world for step in self.steps))
 
     @property
     def memory_limit(self) -> int:
@@ -161,17 +173,17 @@ class BakeJob:
         return [*self.illumination.messages, *self._shining_through()]
 
     def _shining_through(self) -> list[Message]:
-        """The warning about lights behind a slab: they shine through to the side that is baked."""
-        if self.settings.layer != COMBINED or not self.surface.thickness:
+        """The warning about lights behind a slab whose light is left out."""
+        is_slab = self.settings.layer == COMBINED and self.surface.thickness > 0
+        if not is_slab or has_back(self.surface.thickness, self.settings):
             return []
-        grids = [chart.grid for chart in self.receiver.charts]
-        backs = [grid.flipped() for grid in grids]
+        backs = backs_of(self.grids)
         lights = [light for light in self.illumination.lights if not all(light.is_behind(back) for back in backs)]
         if not lights:
             return []
         names = ", ".join(f"'{light.name}'" for light in lights)
-        text = f"Light that shines through the slab '{self.name}' from behind is not baked yet: that of {names}."
-        return [warning(self.name, text)]
+        text = f"Light that reaches the back of '{self.name}' is left out, since LDF samples know one side: {names}."
+        return [warning(self.name, text, "Set Distributions to Library.")]
 
     def _surely_dark(self) -> list[Message]:
         return [] if self.finds_light else self._dark_by_lights()
@@ -181,10 +193,12 @@ class BakeJob:
         lights = self.illumination.lights
         if not lights:
             return [warning("", "The scene has no light that can be baked, so the result is black.")]
-        if all(light.is_behind(chart.grid) for light in lights for chart in self.receiver.charts):
-            text = f"All lights are behind '{self.name}', so it is black."
-            return [warning(self.name, text, "Flip its normals (Mesh > Normals > Flip in Edit Mode).")]
-        return []
+        if self.illumination.reaches(self.lit_grids):
+            return []
+        text, remedy = f"All lights are behind '{self.name}', so it is black.", "Choose another Side in its node."
+        if not self.surface.thickness:
+            remedy = "Flip its normals (Mesh > Normals > Flip in Edit Mode)."
+        return [warning(self.name, text, remedy)]
 
     def is_dark(self) -> bool:
         """True if the result shows that no light arrived; a surface that absorbs everything is black in any light."""

@@ -51,6 +51,8 @@ def bake(
 ) -> list[np.ndarray]:
     """Luminance of translucent planes, between which no light passes, or of a surface that bends.
 
+    Slabs show the light on both of their faces: that of the face behind the grids is transmitted.
+
     Parameters
     ----------
     grids : the planes that light arrives on, or one of faces that bend, scene units.
@@ -83,7 +85,7 @@ def bake(
         sources = _libraries(material, thickness, settings, media_progress, curved)
     else:
         sources = [load_source(settings.sample_folder, settings.distributions)] * 3
-    reports = {"report_noise": report_noise, "report_bend": report_bend}
+    reports = {"report_noise": report_noise, "report_bend": report_bend, "is_slab": has_back(thickness, settings)}
     return spread(grids, illumination, material, sources, settings, light_progress, bytes_for_light, **reports)
 
 
@@ -99,11 +101,50 @@ def spread(
     report_noise: Report | None = None,
     rays: int = 0,
     report_bend: Callable[[float], None] | None = None,
+    is_slab: bool = False,
 ) -> list[np.ndarray]:
     """`bake` with the LDF of each channel given; the material is checked, and `settings.quality` does not count.
 
-    `rays`: from each texel to all lights of a size together; 0: by the medium, see `rays_per_texel`.
+    `rays`: from each texel to all lights of a size together; 0: by the medium, see `rays_per_texel`. `is_slab`: light
+    on the face behind counts, see `has_back`.
     """
+    sides = {"reflected": list(grids), **({"transmitted": backs_of(grids)} if is_slab else {})}
+    # A side without light takes no time.
+    lit = {side: there for side, there in sides.items() if illumination.reaches(there)} or {"reflected": list(grids)}
+    parts = Progress.of(progress).split([1.0] * len(lit))
+    rest = bytes_for_light, seed, report_noise, rays, report_bend
+    results = [
+        spread_side(side, there, illumination, material, sources, settings, part, *rest)
+        for (side, there), part in zip(lit.items(), parts)
+    ]
+    return [sum(on_grid[1:], start=on_grid[0]) for on_grid in zip(*results)]
+
+
+def has_back(thickness: float, settings: BakeSettings) -> bool:
+    """True if light on the face behind a surface counts: in slabs whose LDF is known on both sides."""
+    return thickness > 0 and settings.layer == COMBINED and settings.distributions == "library"
+
+
+def backs_of(grids: Sequence[AnyGrid]) -> list[AnyGrid]:
+    """The grids of the faces behind: the same texels."""
+    return [grid.flipped() for grid in grids]
+
+
+def spread_side(
+    side: str,
+    grids: Sequence[AnyGrid],
+    illumination: Illumination,
+    material: Material,
+    sources: list,
+    settings: BakeSettings,
+    progress: Callback | None = None,
+    bytes_for_light: int = 0,
+    seed: int = 0,
+    report_noise: Report | None = None,
+    rays: int = 0,
+    report_bend: Callable[[float], None] | None = None,
+) -> list[np.ndarray]:
+    """Luminance by light on one side of the grids: on their own (reflected), or on that behind (transmitted)."""
     by_rays: dict[int, list[int]] = {}
     for number, grid in enumerate(grids):
         by_rays.setdefault(rays or rays_per_texel(grid, material, settings), []).append(number)
@@ -112,13 +153,14 @@ def spread(
     rest = illumination, material, sources, settings
     luminances: list = [None] * len(grids)
     for (count, group), numbers, part in zip(groups, by_rays.values(), parts):
-        of_group = _spread_group(group, *rest, count, part, bytes_for_light, seed, report_noise, report_bend)
+        of_group = _spread_group(side, group, *rest, count, part, bytes_for_light, seed, report_noise, report_bend)
         for number, luminance in zip(numbers, of_group):
             luminances[number] = luminance
     return luminances
 
 
 def _spread_group(
+    side: str,
     grids: list[AnyGrid],
     illumination: Illumination,
     material: Material,
@@ -131,7 +173,7 @@ def _spread_group(
     report_noise: Report | None,
     report_bend: Callable[[float], None] | None,
 ) -> list[np.ndarray]:
-    """`spread` for grids with as many rays to each texel."""
+    """`spread_side` for grids with as many rays to each texel."""
 
     def report_spread(irradiance: float, variance: float) -> None:
         if report_noise:
@@ -157,6 +199,7 @@ def _spread_group(
             progress=progress,
             report_noise=report_spread,
             report_beyond=lambda shares: report_bend and report_bend(max(shares)),
+            **({} if side == "reflected" else {"side": side}),
         )
     except native.MemoryLimit as error:
         largest = max(grids, key=lambda grid: grid.texels)

@@ -97,7 +97,7 @@ class Solve(Step):
     name = "Baking"
 
     def seconds(self, job: BakeJob) -> float:
-        return job.workload().seconds(job.settings)
+        return sum(load.seconds(job.settings) for load in job.workloads())
 
     def kind(self, job: BakeJob) -> str:
         return self.kind_for(job.settings)

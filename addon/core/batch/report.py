@@ -11,6 +11,7 @@ from ..bake.runner import FAILED, SKIPPED, WRITTEN, Bake
 from ..disk import whole_file
 from ..messages import Level
 from ..scene.illumination import Illumination
+from ..target import FRONT, Target
 
 
 @dataclass
@@ -23,6 +24,7 @@ class BakeRecord:
     width, height : texels; of UDIM tiles those of the largest.
     files : files of UDIM tiles; the report has this key for them alone.
     exposure : factor that the file's values were multiplied by; radiance is a value divided by it.
+    side : the face of a slab that was baked, FRONT or BACK.
     seconds : wall-clock time.
     estimated_seconds : the same, as estimated before the bake.
     output : the requested pass, LUMINANCE, IRRADIANCE or DIRECTION.
@@ -49,6 +51,7 @@ class BakeRecord:
     estimated_seconds: float = 0.0
     files: list[str] = field(default_factory=list)
     exposure: float = 1.0
+    side: str = FRONT
 
     @classmethod
     def of(cls, bake: Bake, frame: int) -> BakeRecord:
@@ -56,7 +59,7 @@ class BakeRecord:
         job, subject = bake.job, (bake.target.object_name, bake.target.material_name, frame, bake.path)
         outcome = round(bake.seconds, 3), bake.status, " ".join(map(str, bake.messages))
         if job is None:
-            return cls(*subject, 0, 0, *outcome)
+            return cls(*subject, 0, 0, *outcome, side=bake.target.side)
         lights = (
             bake.lights,
             [str(message) for message in job.left_out() if message.level is not Level.INFO],
@@ -68,7 +71,7 @@ class BakeRecord:
             size = max(job.receiver.tiling.sizes.values())
         files = [bake.path.replace("<UDIM>", str(number)) for number in tiles]
         rest = bake.is_dark, round(bake.estimated_seconds, 3), files, bake.exposure
-        return cls(*subject, *size, *outcome, job.settings.output, *lights, *rest)
+        return cls(*subject, *size, *outcome, job.settings.output, *lights, *rest, side=bake.target.side)
 
     def entry(self) -> dict:
         """Entry of the report."""
@@ -76,7 +79,7 @@ class BakeRecord:
         return entry if self.files else {key: value for key, value in entry.items() if key != "files"}
 
     def __str__(self) -> str:
-        subject = f"{self.object} / {self.material}" if self.material else self.object
+        subject = Target(self.object, self.material, self.side)
         text = f"{subject}, frame {self.frame}: {self.status}"
         if self.path and self.status == WRITTEN:
             text += f" {self.path} ({self.width} x {self.height}, {self.seconds:.1f} s)"
@@ -126,7 +129,7 @@ class PreviousReport:
         known = {field.name for field in fields(BakeRecord)}
         for entry in _entries(report):
             record = BakeRecord(**{key: value for key, value in entry.items() if key in known})
-            self._records[record.object, record.material, record.frame] = record
+            self._records[_key(record)] = record
 
     def skipped(self, wanted: BakeRecord, needs_record: bool = False) -> BakeRecord | None:
         """The record of a bake that can be skipped, or None.
@@ -141,7 +144,7 @@ class PreviousReport:
         path = Path(wanted.path)
         if not path.is_file() or path.stat().st_mtime <= self._since:
             return None
-        record = self._records.get((wanted.object, wanted.material, wanted.frame))
+        record = self._records.get(_key(wanted))
         if record is None:
             return None if needs_record else replace(wanted, status=SKIPPED, message=KEPT)
         same = all(getattr(record, name) == getattr(wanted, name) for name in ("output", "indirect", "width", "height"))
@@ -154,7 +157,7 @@ class PreviousReport:
 
         The caller checks that the files are complete. `resolution`: texels along the longer side, None for any.
         """
-        record = self._records.get((wanted.object, wanted.material, wanted.frame))
+        record = self._records.get(_key(wanted))
         if record is None or not record.files or record.status not in (WRITTEN, SKIPPED):
             return None
         paths = [Path(file) for file in record.files]
@@ -163,6 +166,10 @@ class PreviousReport:
         if not (is_new and same) or resolution not in (None, max(record.width, record.height)):
             return None
         return replace(record, status=SKIPPED, message=record.message or KEPT)
+
+
+def _key(record: BakeRecord) -> tuple:
+    return record.object, record.material, record.side, record.frame
 
 
 def _entries(report: str | None) -> list[dict]:

@@ -52,7 +52,15 @@ class LiveTarget:
         shadows = self.illumination.shadow_key()
         arrays = self.polygons.corners, self.polygons.uvs, self.polygons.normals, self.polygons.corner_normals
         texture = () if self.texture is None else (self.texture.blur, *map(_key, self.texture.colors))
-        rest = self.size or self.resolution, self.surface, self.settings, texture, self.spread, self.max_bounces
+        rest = (
+            self.target.side,
+            self.size or self.resolution,
+            self.surface,
+            self.settings,
+            texture,
+            self.spread,
+            self.max_bounces,
+        )
         return lights, shadows, *map(_key, arrays), *rest
 
 

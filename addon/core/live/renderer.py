@@ -11,7 +11,7 @@ from ..bake.bake_settings import COMBINED, BakeSettings
 from ..bake.bent_limits import bent_messages
 from ..bake.edges import with_edges
 from ..bake.finish import finished_texture, with_seams
-from ..bake.layers import spread
+from ..bake.layers import backs_of, has_back, spread, spread_side
 from ..bake.surface import channel_media
 from ..errors import BakeError
 from ..ldf.albedo import albedo_from_reflectance
@@ -141,7 +141,8 @@ class LiveRenderer:
             [chart.grid for chart in framed.receiver.charts], target.surface, target.target.object_name
         )
         name, bends = target.target.object_name, [0.0]
-        values = spread(grids, illumination, *rest, report_bend=bends.append)
+        is_slab = has_back(target.surface.thickness, target.settings)
+        values = spread(grids, illumination, *rest, report_bend=bends.append, is_slab=is_slab)
         is_bent = self._mesh(target).is_bent
         limits = bent_messages(name, target.surface, target.settings, max(bends)) if is_bent else ()
         texture = finished_texture(framed.receiver, values, material, target.settings)
@@ -198,13 +199,18 @@ class LiveRenderer:
     ) -> np.ndarray:
         """Luminance below the surface, float32 (height, width, 3), continued around the charts."""
         rest = *self._material(target), settings, progress
+        is_slab = has_back(target.surface.thickness, settings)
         grids = [replace(chart.grid, color_out=None) for chart in framed.receiver.charts]
         sizes = {(grid.width, grid.height, grid.pitch_x, grid.pitch_y) for grid in grids}
         # The cache has kernels of few sizes, and of planes.
         if len(grids) > MAX_GRIDS_APART or len(sizes) > MAX_FIELDS or framed.receiver.is_bent:
-            values = spread(grids, illumination, *rest, rays=QUICK_RAYS * max(len(illumination.lights), 1))
+            rays = QUICK_RAYS * max(len(illumination.lights), 1)
+            values = spread(grids, illumination, *rest, rays=rays, is_slab=is_slab)
         else:
             values = [self._quick_luminance(grid, illumination, *rest) for grid in grids]
+            if is_slab:
+                backs = [self._quick_luminance(back, illumination, *rest, "transmitted") for back in backs_of(grids)]
+                values = [value + through for value, through in zip(values, backs)]
         return framed.continued(framed.receiver.to_texture(values))
 
     def _together(self, target: LiveTarget) -> Rendering:
@@ -228,12 +234,14 @@ class LiveRenderer:
         sources: list,
         settings: BakeSettings,
         progress,
+        side: str = "reflected",
     ) -> np.ndarray:
+        """Luminance by light on the grid's own side (reflected), or of the other face (transmitted)."""
         lights = [light for light in illumination.lights if not light.is_behind(grid)]
         if not lights:
             return np.zeros((grid.height, grid.width, 3), np.float32)
         if _are_few_suns(lights, grid) or settings.distributions != "library":
-            return spread([grid], illumination, material, sources, settings, progress)[0]
+            return spread_side(side, [grid], illumination, material, sources, settings, progress)[0]
         medium = {
             "ldf": sources,
             "albedo": material.albedo,
@@ -241,7 +249,7 @@ class LiveRenderer:
             "threads": settings.threads,
         }
         color = _common_color(grid, illumination)
-        field = self.kernels.field(grid, medium, is_colored=color is None)
+        field = self.kernels.field(grid, medium, is_colored=color is None, side=side)
         arriving = illumination.native_lights(grid)
         if color is not None:
             arriving = [(light, [max(rgb)] * 3, caster) for light, rgb, caster in arriving]
@@ -252,21 +260,23 @@ class LiveRenderer:
 
     def _mesh(self, target: LiveTarget) -> FlatMesh:
         path, polygons = min(target.surface.material.mean_free_path), target.polygons
-        key = id(polygons), path, target.spread
+        key = id(polygons), path, target.spread, target.surface.thickness > 0
         if key not in self._meshes:
-            mesh = flatten(polygons, path, target.target.object_name, target.spread)
+            mesh = flatten(polygons, path, target.target.object_name, *key[2:])
             # The entry holds the polygons, so that no others get their identity.
             keep_recent(self._meshes, key, (polygons, mesh), MAX_RECEIVERS)
         return self._meshes[key][1]
 
     def _receiver(self, target: LiveTarget, size: tuple[int, int]) -> FramedReceiver:
         mesh = self._mesh(target)
-        key = id(mesh), id(target.texture), size, target.settings.margin, target.settings.margin_type
+        side, settings = target.target.side, target.settings
+        key = id(mesh), id(target.texture), side, size, settings.margin, settings.margin_type
         if key not in self._receivers:
-            receiver = with_seams(build_receiver(mesh, *size, target.target.object_name), mesh, target.settings)
+            receiver = build_receiver(mesh, *size, target.target.object_name)
+            receiver = with_seams(receiver, mesh, settings).seen_from(side)
             if target.texture is not None:
                 receiver = target.texture.on(receiver)
-            framed = FramedReceiver(receiver, target.settings.margin)
+            framed = FramedReceiver(receiver, settings.margin)
             keep_recent(self._receivers, key, (framed, mesh, target.texture), MAX_RECEIVERS)
         return self._receivers[key][0]
 

@@ -30,6 +30,7 @@ class BentGrid:
     coverage : float32, fraction of each texel inside the mesh, 0..1.
     finer : texels of the baked grid along a side for each of these; 1 but in an outline.
     owner, color_in, color_out : as of a `Grid`.
+    is_back : True if the normals are those of the mesh's other side.
     """
 
     middles: np.ndarray
@@ -43,6 +44,7 @@ class BentGrid:
     color_in: np.ndarray | None = None
     color_out: np.ndarray | None = None
     owner: str = ""
+    is_back: bool = False
 
     # Shadow rays start where texels are.
     clearance = 0.0
@@ -137,7 +139,7 @@ class BentGrid:
 
     def flipped(self) -> BentGrid:
         """The grid seen from behind."""
-        return replace(self, normals=-self.normals)
+        return replace(self, normals=-self.normals, is_back=not self.is_back)
 
     def coarse(self, texels: int) -> BentGrid:
         """At most about `texels` x `texels` of the texels that show the mesh, evenly chosen, without colors."""
@@ -148,7 +150,7 @@ class BentGrid:
             return np.ascontiguousarray(values.reshape(self.areas.size, -1)[chosen].reshape(1, -1, *values.shape[2:]))
 
         vectors = (self.middles, self.steps_x, self.steps_y, self.normals, self.tangents)
-        return BentGrid(*map(pick, (*vectors, self.areas, self.coverage)), owner=self.owner)
+        return BentGrid(*map(pick, (*vectors, self.areas, self.coverage)), owner=self.owner, is_back=self.is_back)
 
     def mean(self, values: np.ndarray) -> float:
         """Mean of values (height, width, C) over the surface."""

@@ -13,7 +13,8 @@ from ..messages import Message, note, warning
 from .ears import triangle_corners
 from .islands import NO_UV_AREA, connected_in_map
 from .planes import FLATNESS_TOLERANCE, NO_AREA_BESIDE
-from .polygons import Polygons, components, same_faces
+from .polygons import Polygons, same_faces
+from .sheet import bodies_of, closed_bodies
 
 # Part of a mesh's edges, or of its area, that a sentence about them needs. More: fewer notes about small faults.
 MIN_FAULT = 0.01
@@ -95,16 +96,19 @@ def _outward(polygons: Polygons, corners: np.ndarray, owners: np.ndarray) -> Pol
     )
 
 
-def facing_outward(polygons: Polygons, name: str, spread: float = 0.0) -> tuple[Polygons, list[Message]]:
+def facing_outward(
+    polygons: Polygons, name: str, spread: float = 0.0, is_sheet: bool = False
+) -> tuple[Polygons, list[Message]]:
     """The faces of the object `name` with closed bodies turned right side out, and messages about faces gone wrong.
 
-    `spread`: how far light spreads, for the message about loose parts; 0: nowhere.
+    `spread`: how far light spreads, for the message about loose parts; 0: nowhere. The normals of a sheet tell its
+    front, and stay.
     """
-    first, second = polygons.shared_edges
-    faces = polygons.face_of
-    body_of = components(polygons.count, faces[first], faces[second])
-    is_inward = _is_inside_out(polygons, body_of)[body_of]
+    body_of = bodies_of(polygons)
     messages = [*_faults(polygons, name), *_loose_parts(polygons, body_of, spread, name)]
+    if is_sheet:
+        return polygons, messages
+    is_inward = _is_inside_out(polygons, body_of)[body_of]
     if is_inward.any():
         are = "The normals" if is_inward.all() else f"The normals of {polygons.listed(is_inward)}"
         text = f"{are} of '{name}' point inward; it is baked as if they pointed outward."
@@ -123,20 +127,13 @@ def _turned(polygons: Polygons, is_chosen: np.ndarray) -> Polygons:
 
 def _is_inside_out(polygons: Polygons, body_of: np.ndarray) -> np.ndarray:
     """True for each body that is closed and whose faces look inward, unless it is the hollow of another one."""
-    count = int(body_of.max(initial=-1)) + 1
-    first, _ = polygons.shared_edges
-    corners, is_edge = body_of[polygons.face_of], polygons.points != polygons.points[polygons.next_corners]
-    # Two faces meet at each edge of a closed body.
-    edges, pairs = np.bincount(corners[is_edge], minlength=count), np.bincount(corners[first], minlength=count)
-    middle = polygons.corners.mean(axis=0)
-    heights = np.einsum("ij,ij->i", polygons.corners[polygons.starts[:-1]] - middle, polygons.area_vectors)
-    volumes = np.bincount(body_of, heights, minlength=count) / 3
-    is_inward = (edges == 2 * pairs) & (volumes < 0)
-    is_outward = (edges == 2 * pairs) & (volumes > 0)
+    is_closed, volumes = closed_bodies(polygons, body_of)
+    is_inward, is_outward = is_closed & (volumes < 0), is_closed & (volumes > 0)
     if not (is_inward.any() and is_outward.any()):
         return is_inward
+    corners = body_of[polygons.face_of]
     order = np.argsort(corners, kind="stable")
-    starts = np.searchsorted(corners[order], np.arange(count))
+    starts = np.searchsorted(corners[order], np.arange(len(volumes)))
     lows = np.minimum.reduceat(polygons.corners[order], starts)
     highs = np.maximum.reduceat(polygons.corners[order], starts)
     outer = np.flatnonzero(is_outward)

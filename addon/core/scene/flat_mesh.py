@@ -14,6 +14,7 @@ from .ears import with_triangles
 from .islands import NO_UV_AREA, Island, check_uvs, find_islands
 from .planes import FLATNESS_TOLERANCE, FLATTENED, Plane, find_planes
 from .polygons import Polygons
+from .sheet import sheet_messages
 from .tiles import Place, Tiling
 
 # Part of the area that may lie near edges at which planes meet, if the planes are baked apart. Larger: faster, and more
@@ -74,12 +75,15 @@ def finite_remedy(name: str) -> str:
     return f"Check its scale and modifiers, or run bpy.data.objects['{name}'].data.validate() in the Python Console."
 
 
-def flatten(polygons: Polygons, mean_free_path: float = 0.0, name: str = "", spread: float = 0.0) -> FlatMesh:
+def flatten(
+    polygons: Polygons, mean_free_path: float = 0.0, name: str = "", spread: float = 0.0, is_sheet: bool = False
+) -> FlatMesh:
     """Find the parts of a mesh of the object `name`.
 
     Faces are flattened onto a plane within a mean free path, in the units of the mesh, or within `FLATTENED`: the
     medium, or the texels, show no more. If the rest of the faces does not consist of planes, or if much light crosses
     the edges at which planes meet, all faces are one part. `spread`: how far light spreads; 0: it crosses no edges.
+    `is_sheet`: the faces are slabs, and normals tell their front.
 
     Raises
     ------
@@ -95,12 +99,13 @@ def flatten(polygons: Polygons, mean_free_path: float = 0.0, name: str = "", spr
     tolerance = _tolerance(polygons, mean_free_path)
     polygons, planes, bent = _planes_of(polygons, tolerance)
     check_uvs(polygons.uvs)
+    about_sheet = sheet_messages(polygons, name) if is_sheet else []
     if len(bent) or _edge_part(polygons, planes, spread) > MAX_EDGES:
-        polygons, messages = facing_outward(polygons, name, spread)
-        messages += lost_in_map(polygons, name)
+        polygons, messages = facing_outward(polygons, name, spread, is_sheet)
+        messages += about_sheet + lost_in_map(polygons, name)
         return FlatMesh((bent_part(polygons),), tuple(messages), polygons.uv_map)
     exact = FLATNESS_TOLERANCE * polygons.diagonal
-    messages, parts, lost = [], [], 0.0
+    messages, black, parts, lost = about_sheet, [], [], 0.0
     is_lost = np.zeros(polygons.count, bool)
     for plane in planes:
         # Faces that are flattened are shorter on the plane than their UVs say.
@@ -109,7 +114,7 @@ def flatten(polygons: Polygons, mean_free_path: float = 0.0, name: str = "", spr
             islands = find_islands(polygons, plane, fitted)
         except ReceiverError as error:
             text = f"{error.text} {_capital(polygons.listed(plane.faces))} of '{name}' stay black."
-            messages.append(warning(name, text, error.remedy))
+            black.append(warning(name, text, error.remedy))
             continue
         area = sum(float(island.polygons.areas.sum()) for island in islands)
         lost += float((polygons.area_vectors[plane.faces] @ plane.normal).sum()) - area
@@ -117,9 +122,10 @@ def flatten(polygons: Polygons, mean_free_path: float = 0.0, name: str = "", spr
         if area > 0:
             parts.append(FlatPart(plane, islands))
     if not parts:
-        if messages:
-            raise ReceiverError(messages[0].text, messages[0].remedy)
+        if black:
+            raise ReceiverError(black[0].text, black[0].remedy)
         raise ReceiverError("The UV map has no area, in all or some of the faces.", "Unwrap the mesh again.")
+    messages += black
     part_lost = lost / sum(float(polygons.areas[plane.faces].sum()) for plane in planes)
     if part_lost > FLATNESS_TOLERANCE:
         messages.append(lost_faces(polygons, is_lost, part_lost, name))

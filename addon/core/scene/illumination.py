@@ -96,6 +96,10 @@ class Illumination:
         """The lights that can reach a grid, as native code takes them: light, RGB strength, and `Occluders` or None."""
         return [self._native_light(light, grid) for light in self.lights if not light.is_behind(grid)]
 
+    def reaches(self, grids: Sequence[AnyGrid]) -> bool:
+        """True if one of the lights can reach one of the grids."""
+        return any(not light.is_behind(grid) for light in self.lights for grid in grids)
+
     def arriving_lights(self, grids: Sequence[AnyGrid]) -> list[list[tuple | None]]:
         """All lights at each grid, as those of `native_lights`; None where they can't reach it."""
         # Grids of one origin follow each other, so that its occluders are built once.

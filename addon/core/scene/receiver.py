@@ -13,6 +13,7 @@ import numpy as np
 from ..errors import ReceiverError
 from ..messages import Message, note
 from ..native import native
+from ..target import FRONT
 from .bent_chart import bent_chart
 from .bent_grid import AnyGrid, BentGrid
 from .bent_part import BentPart
@@ -68,6 +69,12 @@ class Receiver:
     def is_bent(self) -> bool:
         """True if it has one chart, of faces that bend."""
         return any(isinstance(chart.grid, BentGrid) for chart in self.charts)
+
+    def seen_from(self, side: str) -> Receiver:
+        """The receiver of the mesh's front, or of its back: the same texels show the other face."""
+        if side == FRONT:
+            return self
+        return replace(self, charts=tuple(replace(chart, grid=chart.grid.flipped()) for chart in self.charts))
 
     def inside(self) -> np.ndarray:
         """Bool (height, width): texels that belong to a chart."""

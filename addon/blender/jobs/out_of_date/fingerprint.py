@@ -14,6 +14,7 @@ import bpy
 from ....core.target import Target
 from ... import compat
 from ...node.find import find_node, find_node_in_groups
+from ...node.node import image_of_side
 from ...read.digests import digest
 from ...read.scene_cache import scene_cache
 from ...read.visibility import by_name
@@ -40,7 +41,8 @@ def fingerprints(context, targets: Iterable[Target], is_for_bake: bool = False) 
     scene_cache.enter(depsgraph)
     scene_cache.check_images()
     objects, known, parts = ObjectDigests(depsgraph, is_for_bake), by_name(scene), {}
-    results = {node.image.name_full for node in map(find_node, bpy.data.materials) if node is not None and node.image}
+    nodes = filter(None, map(find_node, bpy.data.materials))
+    results = {image.name_full for node in nodes for image in (node.image, node.image_back) if image is not None}
     world = _world(compat.original_world(view_layer, scene), view_layer, objects.images)
     for target in targets:
         obj, material = known.get(target.object_name), bpy.data.materials.get(target.material_name)
@@ -54,10 +56,10 @@ def fingerprints(context, targets: Iterable[Target], is_for_bake: bool = False) 
             "lights": _text(objects.lamps),
             "world": world,
             "textures": _digest_of({*objects.images, *texture.images} - results),
-            "material": digest(surface_values(*place), texture.text, *filter(None, [place[0].uv_map])),
+            "material": digest(surface_values(*place, target.side), texture.text, *filter(None, [place[0].uv_map])),
             SETTINGS: settings_part(scene),
             QUALITY: _quality(scene),
-            IMAGE: image_part(place[0].image),
+            IMAGE: image_part(image_of_side(place[0], target.side)),
         }
     return parts
 

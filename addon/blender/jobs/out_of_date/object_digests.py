@@ -147,11 +147,14 @@ def texture_tree(material, node, groups: tuple) -> TreeDigest:
     return scene_cache.texture(material, node.color_input(groups)) if node.has_texture() else TreeDigest()
 
 
-def surface_values(node, _groups: tuple = ()) -> list:
-    """Values of a Beamspread node that bakes read, without those that are linked to it."""
+def surface_values(node, _groups: tuple = (), side: str = "") -> list:
+    """Values of a Beamspread node that bakes read, without those that are linked to it.
+
+    `side`: of the target; digests of earlier versions, which knew no light on the back of slabs, have none.
+    """
     surface = node.surface()
     edges = [] if surface.edges == OPEN else [surface.edges]
-    return [repr(surface), getattr(node, "side", ""), node.has_texture() and node.texture_blur, *edges]
+    return [repr(surface), side if surface.thickness > 0 else "", node.has_texture() and node.texture_blur, *edges]
 
 
 def _scatters(obj) -> bool:

@@ -53,7 +53,7 @@ def check_active_image(target: BakeTarget, settings: BakeSettings, is_running: b
         if is_running and not _saved.has(active):
             remedy = f"If Blender has cleared it, reload it (Image > Reload). {remedy}"
         raise ImageError(f"The active image '{active.name}' is a texture of {reader} and no target.", remedy)
-    if settings.layer != COMBINED and active == target.node.image:
+    if settings.layer != COMBINED and active in (target.node.image, target.node.image_back):
         raise ImageError(
             f"The image '{active.name}' shows luminance in the Beamspread node.",
             f"Choose another active image for {settings.output.lower()}.",

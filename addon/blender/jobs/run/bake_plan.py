@@ -15,6 +15,7 @@ from ....core.bake.bake_settings import COMBINED, BakeSettings
 from ....core.bake.finish import with_seams
 from ....core.bake.forecast import Finders, Forecast
 from ....core.bake.job import BakeJob
+from ....core.bake.layers import backs_of
 from ....core.bake.runner import Bake
 from ....core.bake.spread import Spread, length_of, mean_size
 from ....core.bake.steps import BAKE_STEPS, needs_medium, to_simulate
@@ -25,7 +26,7 @@ from ....core.scene.flat_mesh import FlatMesh
 from ....core.scene.illumination import Illumination
 from ....core.scene.receiver import build_receiver, outline
 from ....core.scene.texture import BaseColor
-from ....core.target import Target
+from ....core.target import FRONT, Target
 from ...cycles.colors import BaseColorByCycles, not_evaluated
 from ...cycles.cycles_light import CyclesLight
 from ...cycles.scene_copy import CopyForCycles
@@ -85,7 +86,9 @@ class BakePlan:
         name, grids = self.target.object_name, [outline(self.mesh, part, *self.size) for part in self.mesh.parts]
         light = self.illumination.lighting(name)
         lamps = sum(name in bpy.data.objects for name in light.by_cycles)
-        bounced = bool(light.lights or light.by_cycles) and self.by_cycles.is_below_something(grids)
+        grids = [grid if self.target.side == FRONT else grid.flipped() for grid in grids]
+        sides = [*grids, *(backs_of(grids) if self.surface.thickness > 0 else [])]
+        bounced = bool(light.lights or light.by_cycles) and self.by_cycles.is_below_something(sides)
         finders = Finders(
             bounced=bounced,
             is_own=not (lamps or light.untraceable),
@@ -100,7 +103,7 @@ class BakePlan:
         """The bake, with its job or the error; call it in the main thread."""
         try:
             receiver = build_receiver(self.mesh, *self.size, self.target.object_name)
-            receiver = with_seams(receiver, self.mesh, settings)
+            receiver = with_seams(receiver, self.mesh, settings).seen_from(self.target.side)
             messages = *self.mesh.messages, *receiver.messages(self.target.object_name)
             illumination = self.illumination.lighting(self.target.object_name).with_messages(*messages)
             job = BakeJob(
@@ -219,7 +222,11 @@ def _is_current(node, copy) -> bool:
     """
     if copy.bl_idname != node.bl_idname or not isinstance(node, BeamspreadNode):
         return copy.bl_idname == node.bl_idname
-    return (copy.surface(), copy.texture_blur, copy.uv_map) == (node.surface(), node.texture_blur, node.uv_map)
+    return _read_values(copy) == _read_values(node)
+
+
+def _read_values(node) -> tuple:
+    return node.surface(), node.texture_blur, node.uv_map, node.sides()
 
 
 def read_plans(

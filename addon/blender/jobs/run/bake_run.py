@@ -64,7 +64,7 @@ def steps_of(plans: list[Plan], settings: BakeSettings, preview_first: bool) -> 
 
 def _image_key(plan: Plan) -> str:
     """Equal for targets that fill the same image."""
-    return f"image {plan.image}" if plan.image else f"material {plan.target.material_name}"
+    return f"image {plan.image}" if plan.image else f"material {plan.target.image_key}"
 
 
 class BakeThread(threading.Thread):

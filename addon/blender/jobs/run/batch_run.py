@@ -162,16 +162,16 @@ class _Batch(Sink):
             path = self._outputs.path(target, settings.layer, self._frame) if image is None else file_of(image)
         except BakeError:
             return None  # the preparation names the error
-        if node is not None and uses_tiles(node):
+        if node is not None and uses_tiles(node, target.side):
             path = path if image is not None else tiles_path(path)
-            wanted = BakeRecord(target.object_name, target.material_name, self._frame, str(path))
+            wanted = BakeRecord(target.object_name, target.material_name, self._frame, str(path), side=target.side)
             wanted.output, wanted.indirect = settings.output, settings.indirect
             record = self._earlier.skipped_tiles(wanted, resolution)
             return record if record is not None and all(size_of(Path(file)) for file in record.files) else None
         size = size_of(path)
         if size is None or (resolution is not None and max(size) != resolution):
             return None
-        wanted = BakeRecord(target.object_name, target.material_name, self._frame, str(path), *size)
+        wanted = BakeRecord(target.object_name, target.material_name, self._frame, str(path), *size, side=target.side)
         wanted.output, wanted.indirect = settings.output, settings.indirect
         return self._earlier.skipped(wanted, needs_record=image is not None)
 

@@ -15,10 +15,11 @@ from ....core.bake.bake_settings import COMBINED
 from ....core.bake.runner import WRITTEN, Bake, Sink, run_bakes
 from ....core.errors import text_of
 from ....core.progress import Progress
-from ....core.target import Target
+from ....core.target import BACK, Target
 from ... import compat
 from ...cycles.scene_copy import CopyForCycles
 from ...node.find import NOTHING_FOUND, BakeTarget, find_misplaced, find_targets, image_of, targets_of
+from ...node.node import image_of_side
 from ...registration import all_or_nothing, classes, handlers
 from ..out_of_date import stale
 from ..out_of_date.fingerprint import Parts
@@ -177,7 +178,14 @@ def _targets_in(obj, passes, width: int, height: int) -> list[BakeTarget]:
         obj.to_mesh_clear()
     used = {int(slot) for slot in np.unique(slots[triangles[triangles < len(slots)]])}
     materials = {slot.material for index, slot in enumerate(obj.material_slots) if index in used}
-    return [target for target in targets_of(obj) if target.material in materials]
+    return [target for target in targets_of(obj) if target.material in materials and _is_of_active_image(target)]
+
+
+def _is_of_active_image(target: BakeTarget) -> bool:
+    """True if Blender's Bake fills the side: the back if the active image is the node's of it, else the first side."""
+    sides, active = target.node.sides(), active_image(target.material)
+    is_back = active is not None and active == image_of_side(target.node, BACK)
+    return target.side == (BACK if is_back and BACK in sides else sides[0])
 
 
 # Panels of Blender that suit this engine: those for any engine, and EEVEE's panels for features of any engine.

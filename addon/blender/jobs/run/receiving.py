@@ -40,10 +40,10 @@ def read_receiver(target: Target, instance: ObjectInstance, fills_image: bool, o
     surface.check()
     if fills_image and image is not None and not is_sequence(image):  # a batch fills a sequence's files
         check_image(image)
-    is_tiled = fills_image and uses_tiles(evaluated.node)
+    is_tiled = fills_image and uses_tiles(evaluated.node, target.side)
     polygons = read_polygons(instance.obj, target.material_name, instance.matrix, evaluated.node.uv_map, is_tiled)
     path = min(surface.material.mean_free_path)
-    mesh = flatten(polygons, path, target.object_name, spread_over_edges(surface))
+    mesh = flatten(polygons, path, target.object_name, spread_over_edges(surface), surface.thickness > 0)
     if outcome is not None:
         mesh = replace(mesh, messages=(outcome, *mesh.messages))
     return Receiving(evaluated, instance, surface, mesh, is_tiled)
@@ -57,7 +57,7 @@ def sized(
     Targets of one material without an image will share a new one.
     """
     target, image, mesh = receiving.target, receiving.target.image, receiving.mesh
-    sharing = [item for item in together if item.target.material.name == target.material.name]
+    sharing = [item for item in together if item.target.name.image_key == target.name.image_key]
     if receiving.is_tiled:
         sizes = _tile_sizes(receiving, sharing, resolution, settings)
         tiling = Tiling(tuple(sorted(sizes.items())), settings.margin)

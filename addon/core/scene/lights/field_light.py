@@ -72,12 +72,14 @@ class BentField:
     spacing : distance of neighbors, about, scene units.
     radiance : float32 (K, N, 3), means by the cosine over K parts of the hemisphere, in the frames of
         `native.BentNodes`, W/(m^2 sr).
+    is_back : as of the nodes' `BentGrid`.
     """
 
     positions: np.ndarray
     normals: np.ndarray
     spacing: float
     radiance: np.ndarray
+    is_back: bool = False
 
 
 @dataclass(frozen=True, eq=False)
@@ -88,7 +90,7 @@ class FieldLight(Light):
 
     Attributes
     ----------
-    fields : one for each plane that the light reaches, or the one of a mesh that bends.
+    fields : one for each plane that the light reaches, and for each side of a mesh that bends.
     position : world position of the lamp that all light comes from, or None.
     direction : unit vector along which all light travels, world, or None.
     """
@@ -114,7 +116,8 @@ class FieldLight(Light):
     def field_of(self, grid: AnyGrid) -> Field | BentField | None:
         if isinstance(grid, Grid):
             return self._fields.get((tuple(grid.origin), tuple(grid.normal)))
-        return next((field for field in self.fields if isinstance(field, BentField)), None)
+        bent = (field for field in self.fields if isinstance(field, BentField))
+        return next((field for field in bent if field.is_back == grid.is_back), None)
 
     def is_behind(self, grid):
         field = self.field_of(grid)
