@@ -20,7 +20,7 @@ REFRACTING = replace(MATERIAL, ior=1.4)
         (Surface(MATERIAL), {}, 0.0, []),
         (Surface(MATERIAL), {}, 0.005, []),
         (Surface(MATERIAL), {}, 0.2, ["20% of the surface"]),
-        (Surface(MATERIAL, 0.1), {}, 0.0, ["as in a flat slab."]),
+        (Surface(MATERIAL, 0.1), {}, 0.2, ["as in a flat one."]),
         (Surface(REFRACTING, 0.1), {}, 0.0, ["mirrors before it scatters"]),
         (Surface(MATERIAL), {"distributions": "angular"}, 0.0, ["know flat surfaces alone"]),
         (Surface(MATERIAL), {"margin": 4, "margin_type": "ADJACENT_FACES"}, 0.0, ["in place of adjacent faces"]),

@@ -28,5 +28,5 @@ def bent_messages(name: str, surface: Surface, settings: BakeSettings, beyond: f
     elif surface.thickness > 0:
         text = f"'{name}' is a sheet that bends. Light in it spreads as in a flat one"
         mirrored = ", without light that its far face mirrors before it scatters" if surface.material.ior > 1 else ""
-        messages.append(note(name, f"{text}{mirrored}."))
+        messages.append(note(name, f"{text}{mirrored}.", "Where it bends tightly, bend it less or make it thinner."))
     return messages

@@ -122,7 +122,8 @@ def spread(
 
 def has_back(thickness: float, settings: BakeSettings) -> bool:
     """True if light on the face behind a surface counts: in slabs whose LDF is known on both sides."""
-    return thickness > 0 and settings.layer == COMBINED and settings.distributions == "library"
+    is_known = settings.distributions == "library" and "side: str" in (native.bake_luminance.__doc__ or "")
+    return thickness > 0 and settings.layer == COMBINED and is_known
 
 
 def backs_of(grids: Sequence[AnyGrid]) -> list[AnyGrid]:
