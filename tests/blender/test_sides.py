@@ -103,7 +103,7 @@ def test_each_face_shows_its_image(scale, plain, ldf, tmp_path):
     plane, sun, _ = add_sheet("BOTH", Matrix.Diagonal((scale, 1, 1, 1)))
     scenes.bake(plane)
     if plain:
-        bpy.ops.beamspread.make_plain()
+        assert bpy.ops.beamspread.make_plain(kind="GROUP") == {"FINISHED"}
     sun.data.energy = 0
     camera, scene = scenes.add_camera(0.2), bpy.context.scene
     scene.world, scene.render.engine = None, "CYCLES"

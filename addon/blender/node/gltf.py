@@ -23,7 +23,8 @@ def begin_export() -> None:
     end_export()  # after an export that failed
     for node in list(all_nodes()):
         tree = node.id_data
-        if node.image is None or tree.library is not None or plain.image_node_of(node) or not is_linked(node):
+        front, back = node.shown_images()
+        if front is None or tree.library is not None or plain.image_node_of(node) or not is_linked(node):
             continue
         had_group = plain_of(node) is not None
         remove_plain(node)
@@ -35,8 +36,10 @@ def begin_export() -> None:
                 make_plain(node)
             continue
         _replaced.append((_owner(tree), node.name, had_group))
+        if plain.leaves_out_back(node):
+            sys.stderr.write(f"Beamspread: glTF: '{back.name}' is left out, since glTF has one image for both faces.\n")
         if exposure != 1:
-            text = f"'{node.image.name}' is exported divided by {1 / exposure:g}, which the emission's strength undoes."
+            text = f"'{front.name}' is exported divided by {1 / exposure:g}, which the emission's strength undoes."
             sys.stderr.write(f"Beamspread: glTF: {text}\n")
     # The exporter calls no function after a failed export.
     if _replaced and not bpy.app.background:

@@ -124,7 +124,7 @@ def _show(node, _context) -> None:
     if tree is not None:
         show_values(tree, *node.shown_images(), node.ior)
         _show_color(node)
-    plain.refresh(node.image, node)
+    plain.refresh(node.shown_images()[0], node)
 
 
 def image_of_side(node, side: str):

@@ -75,7 +75,7 @@ def make(node, kind: str) -> float:
     ImageError
         The node has no single image, or it has no pixels.
     """
-    encoded, exposure = encoded_image(node.image)
+    encoded, exposure = encoded_image(node.shown_images()[0])
     tree = node.id_data
     image = _add(tree, "ShaderNodeTexImage", LABEL, node, (0, 0))
     image.image, image.extension = encoded, "EXTEND"
@@ -88,6 +88,12 @@ def make(node, kind: str) -> float:
     _take_links(node, image, exposure)
     note_exposure(_material_of(tree), exposure)
     return exposure
+
+
+def leaves_out_back(node) -> bool:
+    """True if the node shows two images, of which image nodes show the front's alone."""
+    front, back = node.shown_images()
+    return front != back
 
 
 def remove(node) -> None:
@@ -117,7 +123,8 @@ def refresh(source, chosen=None) -> None:
 
     Nodes whose image is gone, or is no single image, keep what they show.
     """
-    nodes = [node for node in ([chosen] if chosen else all_nodes()) if node.image == source and image_node_of(node)]
+    nodes = [chosen] if chosen else all_nodes()
+    nodes = [node for node in nodes if node.shown_images()[0] == source and image_node_of(node)]
     if not nodes:
         return
     try:
