@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import bpy
 
-from ..images.image_operators import image_in
+from ..images.image_operators import images_in
 from ..node.find import find_node
 from ..preferences import draw_help
 from ..registration import all_or_nothing, classes
@@ -35,8 +35,9 @@ class BEAMSPREAD_PT_sidebar(bpy.types.Panel):
         material = getattr(context.object, "active_material", None)
         if material is None or find_node(material) is None:
             draw_start(layout)
-        elif (image := image_in(context)) is not None:
-            layout.label(text=image.name, icon="IMAGE_DATA")
+        else:
+            for image in images_in(context):
+                layout.label(text=image.name, icon="IMAGE_DATA")
 
 
 def draw_start(layout) -> None:
