@@ -296,9 +296,9 @@ class BeamspreadNode(ColorProperties, PathProperties, bpy.types.ShaderNodeCustom
         chosen = preferences.preferences()
         start(self, chosen.new_base_color if chosen else preferences.NEW_BASE_COLOR)
         self.ior = chosen.new_ior if chosen else preferences.NEW_IOR
+        self.inputs[ROUGHNESS].default_value = NEW_ROUGHNESS
         if chosen:
             self._fill_as_preferred(chosen)
-        self.inputs[ROUGHNESS].default_value = NEW_ROUGHNESS
 
     def _fill_as_preferred(self, chosen) -> None:
         """Take the path or the preset that the user's preferences have for new nodes."""
