@@ -111,14 +111,14 @@ class BeamspreadPreferences(bpy.types.AddonPreferences):
 
     cache_folder: StringProperty(
         name="Cache Folder",
-        description="Folder for simulated media, a few megabytes each. Empty: the user's cache folder",
+        description="Choose the folder for simulated materials, a few megabytes each. Empty: the user's cache folder",
         subtype="DIR_PATH",
         options=compat.PATH_OPTIONS - {"PATH_SUPPORTS_BLEND_RELATIVE"},
         update=_use_cache_folder,
     )
     threads: IntProperty(
         name="Threads",
-        description="Number of threads of a bake. 0: one for each thread of the processor",
+        description="Limit the threads of a bake. 0: all CPU threads",
         default=0,
         min=0,
         soft_max=64,
@@ -126,7 +126,7 @@ class BeamspreadPreferences(bpy.types.AddonPreferences):
     )
     memory_limit: IntProperty(
         name="Memory Limit",
-        description="Megabytes that a bake may use; larger bakes are refused. 0: all of the machine's memory",
+        description="Refuse bakes that need more megabytes. 0: all of the machine's memory",
         default=0,
         min=0,
         soft_max=65536,
@@ -135,13 +135,13 @@ class BeamspreadPreferences(bpy.types.AddonPreferences):
 
     new_preset: EnumProperty(
         name="Preset",
-        description="Measured material of new nodes. Custom: the values below",
+        description="Choose the measured material of new nodes. Custom: the values below",
         items=preset_items(),
         default=CUSTOM_PRESET,
     )
     new_base_color: FloatVectorProperty(
         name="Base Color",
-        description="Color of new nodes",
+        description="Set the base color of new nodes",
         subtype="COLOR",
         size=3,
         default=NEW_BASE_COLOR,
@@ -150,14 +150,14 @@ class BeamspreadPreferences(bpy.types.AddonPreferences):
     )
     new_path: FloatProperty(
         name="Mean Free Path (mm)",
-        description="Mean distance that light travels between two scattering events in new nodes, in millimeters",
+        description="Set the mean distance between two scattering events in new nodes, in millimeters",
         default=NEW_PATH_M * 1000,
         min=1e-4,
         soft_max=1000.0,
         precision=3,
     )
     new_ior: FloatProperty(
-        name="IOR", description="Index of refraction of new nodes", default=NEW_IOR, min=1.0, soft_max=2.0
+        name="IOR", description="Set the index of refraction of new nodes", default=NEW_IOR, min=1.0, soft_max=2.0
     )
 
     def draw(self, context) -> None:
@@ -181,7 +181,7 @@ class BeamspreadPreferences(bpy.types.AddonPreferences):
         files = library.cached_files()
         megabytes = sum(file.stat().st_size for file in files if file.is_file()) / 2**20
         row = layout.row()
-        row.label(text=f"{len(files)} simulated media, {megabytes:.1f} MB, in")
+        row.label(text=f"{len(files)} simulated materials, {megabytes:.1f} MB, in")
         row.operator("beamspread.clear_cache", icon="TRASH")
         layout.label(text=str(library.cache_folder()))  # a row of its own: a button would cut it off
         if url := documentation("guide"):
@@ -189,7 +189,7 @@ class BeamspreadPreferences(bpy.types.AddonPreferences):
 
 
 class BEAMSPREAD_OT_clear_cache(bpy.types.Operator):
-    """Delete all simulated media from the cache. The media that come with the add-on stay"""
+    """Delete all simulated materials from the cache. Those that come with the add-on stay"""
 
     bl_idname = "beamspread.clear_cache"
     bl_label = "Clear"
@@ -200,7 +200,7 @@ class BEAMSPREAD_OT_clear_cache(bpy.types.Operator):
 
     def execute(self, _context):
         freed = library.clear_cache()
-        self.report({"INFO"}, f"Freed {freed / 2**20:.1f} MB. The next bakes simulate their media again")
+        self.report({"INFO"}, f"Freed {freed / 2**20:.1f} MB. The next bakes simulate their materials again")
         return {"FINISHED"}
 
 

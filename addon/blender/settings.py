@@ -26,7 +26,7 @@ class BeamspreadSettings(bpy.types.PropertyGroup):
 
     resolution: IntProperty(
         name="Resolution",
-        description="Longer side of new images, in pixels. Existing images keep their size: use Resize",
+        description="Set the longer side of new images, in pixels. Existing images keep their size: use Resize",
         default=1024,
         min=1,
         soft_min=64,
@@ -36,15 +36,15 @@ class BeamspreadSettings(bpy.types.PropertyGroup):
     )
     use_size: BoolProperty(
         name="Resolution from Size",
-        description="Choose the resolution of each new image by the size of its object, Texel Density, and how far the "
-        "medium spreads light. A resolution that you set switches this off",
+        description="Choose the resolution of each new image by the size of its object, Texel Density, and how far "
+        "the medium spreads light. A resolution that you set switches this off",
         get=_follows_size,
         set=_follow_size,
     )
     texel_density: FloatProperty(
         name="Texel Density",
-        description="Pixels per meter of new images, whose longer side has 512 to 2048 pixels. It has up to 4096 where "
-        "the spread of light needs them",
+        description="Set the pixels per meter of new images, whose longer side has 512 to 2048 pixels, and up to 4096 "
+        "where the spread of light needs them",
         default=512.0,
         min=0.01,
         soft_min=16.0,
@@ -52,7 +52,7 @@ class BeamspreadSettings(bpy.types.PropertyGroup):
     )
     solver: EnumProperty(
         name="Solver",
-        description="Method that computes the scattering of light. All give the same result within their tolerance",
+        description="Choose how the scattering of light is computed. All methods agree within their tolerance",
         items=[
             ("fft", "FFT", "Takes seconds for any number of lights", 0),
             (
@@ -67,7 +67,7 @@ class BeamspreadSettings(bpy.types.PropertyGroup):
     )
     quality: EnumProperty(
         name="Quality",
-        description="Quality of the material simulation, which runs once for each material",
+        description="Choose the quality of the material simulation, which runs once for each material",
         items=[
             ("preview", "Preview", "A few seconds for a new material; slightly noisy", 0),
             (
@@ -81,10 +81,10 @@ class BeamspreadSettings(bpy.types.PropertyGroup):
     )
     distributions: EnumProperty(
         name="Distributions",
-        description="Source of the light distributions (LDFs). Samples are for research",
+        description="Choose where light distributions (LDFs) come from. Samples are for research",
         items=[
             ("LIBRARY", "Library", "Simulated for each material, for all angles and albedos", 0),
-            ("ANGULAR", "Samples, Angular", "Your own samples, interpolated as in Manabe et al. 2012", 1),
+            ("ANGULAR", "Samples, Angular", "Your own samples, interpolated by the method of Manabe et al. 2012", 1),
             (
                 "ADAPTIVE",
                 "Samples, Adaptive",
@@ -97,16 +97,17 @@ class BeamspreadSettings(bpy.types.PropertyGroup):
     )
     sample_folder: StringProperty(
         name="LDF Samples",
-        description="Folder of EXR files with one LDF sample each. They replace anisotropy, index of refraction and "
-        "thickness of all materials. Albedos and angles of light must lie between those of the samples",
+        description="Choose a folder of EXR files with one LDF sample each. They replace anisotropy, index of "
+        "refraction and thickness of all materials. Albedos and angles of light must lie between those of "
+        "the samples",
         default="",
         subtype="DIR_PATH",
         options=compat.PATH_OPTIONS,
     )
     samples: IntProperty(
         name="Samples",
-        description="Quality of soft shadows. Doubling the value takes four times as long: 4 casts 16 rays per pixel "
-        "to each lamp without a size, and up to 1024 (4096 from 8 on) to all other lights together",
+        description="Set the quality of soft shadows. Twice the value takes four times as long: 4 casts 16 rays per "
+        "pixel to each lamp without a size, and up to 1024 (4096 from 8 on) to all other lights together",
         default=4,
         min=1,
         soft_max=16,
@@ -114,7 +115,7 @@ class BeamspreadSettings(bpy.types.PropertyGroup):
     )
     margin: IntProperty(
         name="Margin",
-        description="Pixels by which the result extends past UV borders, as in Blender's Bake > Margin",
+        description="Extend the result past UV borders by so many pixels, as in Blender's Bake > Margin",
         default=16,
         min=0,
         soft_max=64,
@@ -123,7 +124,7 @@ class BeamspreadSettings(bpy.types.PropertyGroup):
     )
     margin_type: EnumProperty(
         name="Margin Type",
-        description="Content of the margin",
+        description="Choose what fills the margin",
         items=[
             ("EXTEND", "Extend", "Each UV island goes on as at its border", 0),
             ("ADJACENT_FACES", "Adjacent Faces", "Light of the face on the other side of the UV border", 1),
@@ -132,7 +133,7 @@ class BeamspreadSettings(bpy.types.PropertyGroup):
     )
     output: EnumProperty(
         name="Output",
-        description="Quantity to bake. Irradiance and Direction go to extra images, named after the node's",
+        description="Choose what to bake. Irradiance and Direction go to extra images, named after the node's",
         items=[
             ("LUMINANCE", "Luminance", "Scattered light that leaves the surface, W/(m² sr): the node shows it", 0),
             (
@@ -157,14 +158,14 @@ class BeamspreadSettings(bpy.types.PropertyGroup):
     )
     output_dir: StringProperty(
         name="Folder",
-        description="Folder that a batch writes to",
+        description="Choose the folder that a batch writes to",
         default="//beamspread/",
         subtype="DIR_PATH",
         options=compat.PATH_OPTIONS,
     )
     image_storage: EnumProperty(
         name="Storage",
-        description="Storage of new images",
+        description="Choose where new images are kept",
         items=[
             ("FILES", "Files", "OpenEXR files. In a scene that was never saved, images are packed", 0),
             ("PACKED", "Packed", "In the .blend file, which grows by 200 MB for 4096 x 4096 pixels", 1),
@@ -173,14 +174,14 @@ class BeamspreadSettings(bpy.types.PropertyGroup):
     )
     image_dir: StringProperty(
         name="Folder",
-        description="Folder of the files of new images",
+        description="Choose the folder for the files of new images",
         default="//textures/",
         subtype="DIR_PATH",
         options=compat.PATH_OPTIONS,
     )
     image_name: StringProperty(
         name="Name",
-        description="Name of new images and their files. {object} and {material} are replaced by the names of both",
+        description="Name new images and their files. {object} and {material} are replaced by the names of both",
         default="{object}_{material}",
     )
     use_udim: BoolProperty(
@@ -196,7 +197,7 @@ class BeamspreadSettings(bpy.types.PropertyGroup):
     )
     render_engine: EnumProperty(
         name="Render With",
-        description="Engine that renders images (F12) with the bakes in them, while the render engine is Beamspread",
+        description="Choose the engine that renders images (F12) while the render engine is Beamspread",
         items=[
             ("CYCLES", "Cycles", "Path tracing; needs no OpenGL", 0),
             ("EEVEE", "EEVEE", "Faster; needs OpenGL", 1),
@@ -205,14 +206,13 @@ class BeamspreadSettings(bpy.types.PropertyGroup):
     )
     use_live: BoolProperty(
         name="Live",
-        description="Preview the bake while you change lights, objects and materials, without indirect light. "
-        "Nodes show a hidden preview image; their own image, and editors and other nodes that show it, do not follow. "
-        "Switch off to see the last bake again",
+        description="Preview the bake while you change lights, objects and materials. Nodes show a hidden image; "
+        "their own one does not follow. Switch off to see the last bake again",
         default=False,
     )
     format: EnumProperty(
         name="Format",
-        description="File format that a batch writes",
+        description="Choose the file format that a batch writes",
         items=[
             ("EXR", "OpenEXR", "Linear, 32-bit float, W/(m^2 sr)", 0),
             ("PNG", "PNG", "sRGB, 8 bits; values above 1 are clipped unless Fit Exposure scales them", 1),

@@ -65,7 +65,9 @@ class BEAMSPREAD_OT_make_plain(NodeOperator, bpy.types.Operator):
     bl_idname = "beamspread.make_plain"
     bl_label = "Make Plain Nodes"
 
-    kind: EnumProperty(name="Kind", description="Nodes that show the bake", items=plain.KINDS, default=plain.COAT)
+    kind: EnumProperty(
+        name="Kind", description="Choose the nodes that show the bake", items=plain.KINDS, default=plain.COAT
+    )
 
     def change(self, node):
         if output.has_plain(node):

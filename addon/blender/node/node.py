@@ -165,7 +165,7 @@ class BeamspreadNode(ColorProperties, PathProperties, bpy.types.ShaderNodeCustom
     )
     color_mode: EnumProperty(
         name="Color",
-        description="Way to set the color of the material",
+        description="Choose how to set the color of the material. A switch converts the value",
         items=[
             ("BASE_COLOR", "Base Color", "Set the visible color; the albedo is computed", 0),
             (
@@ -180,7 +180,8 @@ class BeamspreadNode(ColorProperties, PathProperties, bpy.types.ShaderNodeCustom
     )
     base_color: FloatVectorProperty(
         name="Base Color",
-        description="Color of the surface in white, uniform light. Limited to the colors that this medium can reach",
+        description="Set the color of the surface in white, uniform light. One too bright for this material becomes "
+        "the brightest that it can have",
         subtype="COLOR",
         size=3,
         default=(0.6, 0.6, 0.6),
@@ -190,7 +191,8 @@ class BeamspreadNode(ColorProperties, PathProperties, bpy.types.ShaderNodeCustom
     )
     albedo: FloatVectorProperty(
         name="Scattering Albedo",
-        description="Share of light that survives each scattering event, below 1. Bright materials have above 0.99",
+        description="Set the share of light that survives each scattering event, below 1. Bright materials have above "
+        "0.99",
         size=3,
         default=(0.9, 0.9, 0.9),
         soft_min=0.0,
@@ -201,7 +203,7 @@ class BeamspreadNode(ColorProperties, PathProperties, bpy.types.ShaderNodeCustom
     )
     mean_free_path: FloatVectorProperty(
         name="Mean Free Path",
-        description="Mean distance that light travels between two scattering events, for red, green and blue",
+        description="Set the mean distance that light travels between two scattering events, for red, green and blue",
         subtype="XYZ_LENGTH",
         unit="LENGTH",
         size=3,
@@ -214,8 +216,8 @@ class BeamspreadNode(ColorProperties, PathProperties, bpy.types.ShaderNodeCustom
     )
     anisotropy: FloatProperty(
         name="Anisotropy",
-        description="0: light scatters in all directions. Near 1: it keeps going forward (Henyey-Greenstein). "
-        "A value that is new to this machine is simulated once, in a minute or two",
+        description="Set the direction of scattered light. 0: all directions; near 1: forward (Henyey-Greenstein). A "
+        "new value is simulated once, in a minute or two",
         default=0.8,
         soft_min=-0.95,
         soft_max=0.95,
@@ -223,7 +225,8 @@ class BeamspreadNode(ColorProperties, PathProperties, bpy.types.ShaderNodeCustom
     )
     ior: FloatProperty(
         name="IOR",
-        description="Index of refraction. 1 = no glossy coat",
+        description="Set the index of refraction. 1 = no glossy coat. A new value is simulated once, in a minute or "
+        "two",
         default=1.0,
         soft_min=1.0,
         soft_max=2.0,
@@ -231,7 +234,8 @@ class BeamspreadNode(ColorProperties, PathProperties, bpy.types.ShaderNodeCustom
     )
     thickness: FloatProperty(
         name="Thickness",
-        description="Thickness of the material. 0 = infinitely thick",
+        description="Set the thickness of the material. 0 = infinitely thick. A new value is simulated once, in a "
+        "minute or two",
         subtype="DISTANCE",
         default=0.0,
         soft_min=0.0,
@@ -242,7 +246,7 @@ class BeamspreadNode(ColorProperties, PathProperties, bpy.types.ShaderNodeCustom
     )
     side: EnumProperty(
         name="Side",
-        description="Faces of a thin material that get an image. Light on both faces counts in each",
+        description="Choose which faces of a thin material get an image. Light on both faces counts in each",
         items=(
             (FRONT, "Front", "The face that normals point out of", 0),
             (BACK, "Back", "The other face", 1),
@@ -253,7 +257,7 @@ class BeamspreadNode(ColorProperties, PathProperties, bpy.types.ShaderNodeCustom
     )
     edges: EnumProperty(
         name="Edges",
-        description="What the edges of a plane do with light inside the material",
+        description="Choose what the edges of a plane do with light inside the material",
         items=(
             (OPEN, "Open", "Light leaves through the edges"),
             (MIRROR, "Mirror", "Light returns as from a mirror: tiles, trim sheets, floors that end at walls"),
@@ -262,24 +266,25 @@ class BeamspreadNode(ColorProperties, PathProperties, bpy.types.ShaderNodeCustom
     )
     image: PointerProperty(
         name="Image",
-        description="Image that the bake fills. Empty: a new image is created",
+        description="Choose the image that the bake fills. Empty: a new image is created",
         type=bpy.types.Image,
         update=_show,
     )
     image_back: PointerProperty(
         name="Back Image",
-        description="Image of the back that the bake fills. Empty: a new image is created",
+        description="Choose the image of the back that the bake fills. Empty: a new image is created",
         type=bpy.types.Image,
         update=_show,
     )
     uv_map: StringProperty(
         name="UV Map",
-        description="UV map of the image. Empty: the map that renders or, if it does not fit, one that the bake makes",
+        description="Choose the UV map of the image. Empty: the map that renders or, if it does not fit, one that the "
+        "bake makes",
         update=_map_edited,
     )
     texture_blur: FloatProperty(
         name="Texture Blur",
-        description="How much scattering blurs the texture at Base Color. 0 = sharp, 1 = fully blurred",
+        description="Set how much scattering blurs the texture at Base Color. 0 = sharp, 1 = fully blurred",
         subtype="FACTOR",
         default=0.5,
         min=0.0,

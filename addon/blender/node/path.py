@@ -74,8 +74,8 @@ class PathProperties:
 
     path_length: FloatProperty(
         name="Mean Free Path",
-        description="Mean distance that light travels between two scattering events, in the channel where it is "
-        "longest. Larger: softer, and shadows fill with light",
+        description="Set the mean distance that light travels between two scattering events, in the channel where it "
+        "is longest. Larger: softer, and shadows fill with light",
         subtype="DISTANCE",
         unit="LENGTH",
         min=0.0,
@@ -100,8 +100,8 @@ class PathProperties:
     )
     path_color: FloatVectorProperty(
         name="Path Color",
-        description="Set how far each color travels, relative to the mean free path: red light goes farther than "
-        "blue in skin, so its path color is red",
+        description="Set how far each color travels, relative to the mean free path: red light goes farther than blue "
+        "in skin, so its path color is red",
         subtype="COLOR",
         size=3,
         min=0.0,

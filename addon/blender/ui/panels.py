@@ -101,8 +101,31 @@ class BEAMSPREAD_PT_expert(RenderPanel, bpy.types.Panel):
         if settings.output != "LUMINANCE":
             return  # no medium, no solver
         column.prop(settings, "solver")
+        if settings.distributions == "LIBRARY":
+            column.prop(settings, "quality")
+
+
+class BEAMSPREAD_PT_samples(RenderPanel, bpy.types.Panel):
+    """Light distributions of one's own, for research."""
+
+    bl_label = "Your Own LDFs"
+    bl_parent_id = "BEAMSPREAD_PT_expert"
+    bl_options = {"DEFAULT_CLOSED"}
+
+    @classmethod
+    def poll(cls, context):
+        return context.scene.beamspread.output == "LUMINANCE"
+
+    def draw_header_preset(self, _context):
+        draw_help(self.layout, "python-and-batch")
+
+    def draw(self, context):
+        _use_columns(self.layout)
+        column = self.layout.column()
+        settings = context.scene.beamspread
         column.prop(settings, "distributions")
-        column.prop(settings, "quality" if settings.distributions == "LIBRARY" else "sample_folder")
+        if settings.distributions != "LIBRARY":
+            column.prop(settings, "sample_folder")
 
 
 class BEAMSPREAD_PT_active_image(RenderPanel, bpy.types.Panel):
@@ -254,6 +277,7 @@ class BEAMSPREAD_PT_node_editor(MaterialPanel, bpy.types.Panel):
 _classes = (
     BEAMSPREAD_PT_render,
     BEAMSPREAD_PT_expert,
+    BEAMSPREAD_PT_samples,
     BEAMSPREAD_PT_active_image,
     BEAMSPREAD_PT_images,
     BEAMSPREAD_PT_batch,

@@ -60,9 +60,9 @@ def default_pitch(medium, size: int) -> float:
 
 def read_maps(library, angle_deg: float, albedos: Sequence[float], size: int, pitch: float, side: str) -> Maps:
     """Evaluate a library's images and standard errors."""
-    travelling = ", travelling towards +u" if angle_deg else ""
+    traveling = ", traveling towards +u" if angle_deg else ""
     return Maps(
-        title=f"LDF, {side} light: {describe(library.medium)}; beam at {angle_deg:g}°{travelling}",
+        title=f"LDF, {side} light: {describe(library.medium)}; beam at {angle_deg:g}°{traveling}",
         oblique=angle_deg > 0,
         pitch=pitch,
         albedos=tuple(albedos),

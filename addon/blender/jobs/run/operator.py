@@ -38,6 +38,7 @@ class BEAMSPREAD_OT_bake(bpy.types.Operator):
 
     objects: EnumProperty(
         name="Objects",
+        description="Choose the objects to bake",
         items=[
             ("SELECTED", "Selected", "Bake the selected objects. If none has a Beamspread node, bake all", 0),
             ("ALL", "All", "Bake all objects that have a Beamspread node", 1),
