@@ -19,9 +19,9 @@ Each part imports only core and those above it (tests/unit/test_layers.py reads 
 from . import preferences, settings
 from .cycles import kept_world, process
 from .images import atlas, facts, image_operators, undo
-from .jobs import state
+from .jobs import frozen, state
 from .jobs.out_of_date import stale
-from .jobs.run import active_image, engine, operator, render_copy
+from .jobs.run import active_image, engine, files_operators, operator, render_copy
 from .live import timer
 from .node import buttons, node
 from .read import scene_cache
@@ -41,11 +41,13 @@ PARTS = (
     kept_world,
     process,
     state,
+    frozen,
     stale,
     active_image,
     engine,
     render_copy,
     operator,
+    files_operators,
     timer,
     panels,
     sidebar,

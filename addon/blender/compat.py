@@ -17,6 +17,10 @@ SHADER_MENUS = ("NODE_MT_category_shader_shader", "NODE_MT_category_SH_NEW_SHADE
 """Names of the menu Add > Shader: of the Shader Editor in newer versions, and in Blender 3.4."""
 
 
+BAR_LETTERS = 20
+"""Letters of a progress bar, which fit the panels of a new window."""
+
+
 def session_id(block) -> int:
     """A number that no other data-block of the session has (Blender 4.1 on); before, its address."""
     return getattr(block, "session_uid", 0) or block.as_pointer()
@@ -59,8 +63,10 @@ def draw_progress_bar(layout, fraction: float, text: str) -> None:
     if hasattr(layout, "progress"):
         layout.progress(factor=fraction, text=text)
     else:
-        full = round(10 * fraction)
-        layout.label(text=f"{chr(0x2588) * full}{chr(0x2591) * (10 - full)} {text}", icon="BLANK1")
+        full = round(BAR_LETTERS * fraction)
+        column = layout.column(align=True)  # the bar and the text in one line do not fit the width of a new window
+        column.label(text=f"{chr(0x2588) * full}{chr(0x2591) * (BAR_LETTERS - full)}", icon="BLANK1")
+        column.label(text=text, icon="BLANK1")
 
 
 def give_new_node_its_tree(node, tree) -> None:
@@ -358,6 +364,18 @@ def set_shader_color(tree) -> None:
     """Give nodes of this group the color of shaders (shown in 5.2; 4.3 ignores the tag on custom groups)."""
     if hasattr(tree, "color_tag"):
         tree.color_tag = "SHADER"
+
+
+def curves_of(animation) -> list:
+    """Curves of the action of animation data (Blender 5.0 has them in layers alone, by slots)."""
+    action = animation.action
+    if action is None:
+        return []
+    if bpy.app.version < (5, 0, 0):
+        return list(action.fcurves)
+    slot = animation.action_slot
+    bags = [strip.channelbag(slot) for layer in action.layers for strip in layer.strips] if slot is not None else []
+    return [curve for bag in bags if bag is not None for curve in bag.fcurves]
 
 
 def subsurface_walk(shader, method: str) -> str | None:

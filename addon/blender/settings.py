@@ -222,6 +222,13 @@ class BeamspreadSettings(bpy.types.PropertyGroup):
         ],
         default="EXR",
     )
+    use_frame_range: BoolProperty(
+        name="Own Range",
+        description="Choose the frames of Bake Animation, instead of those of the scene or of its preview range",
+        default=False,
+    )
+    frame_first: IntProperty(name="First Frame", description="First frame of Bake Animation", default=1, min=0)
+    frame_last: IntProperty(name="Last", description="Last frame of Bake Animation", default=250, min=0)
     use_exposure: BoolProperty(
         name="Fit Exposure",
         description="Multiply the values of PNG files by the power of two that brings them to 1 or below. The file, "

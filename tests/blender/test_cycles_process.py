@@ -219,6 +219,50 @@ def test_an_orphan_ends_and_removes_all(is_stopped):
 
 
 @IS_POSIX
+def test_nothing_is_left_of_an_orphan_whose_folder_went_before_it_began(tmp_path):
+    """As where a window is closed right after a bake has asked for Cycles."""
+    program = [bpy.app.binary_path, "-b", "--factory-startup", "--python"] if bpy.app.binary_path else [sys.executable]
+    environment = os.environ | {"TMPDIR": str(tmp_path)}
+    child = subprocess.Popen([*program, str(process.CHILD), "--", "mark", "60"], stdin=subprocess.PIPE, env=environment)
+    child.stdin.close()
+    assert child.wait(60) == 0
+    assert [path.name for path in tmp_path.iterdir() if not path.name.startswith("pulse-")] == []
+
+
+@IS_POSIX
+def test_nothing_is_left_where_a_script_ends_while_the_world_renders(tmp_path):
+    """Without switching the add-on off: Cycles' process ends before its folder goes."""
+    program = [bpy.app.binary_path, "-b", "--factory-startup", "--python"] if bpy.app.binary_path else [sys.executable]
+    command = [*program, str(PARENT), "--", str(STAGE), "leave"]
+    environment = os.environ | {"TMPDIR": str(tmp_path)}
+    done = subprocess.run(command, stdout=subprocess.PIPE, text=True, env=environment, timeout=120)
+    number = int(next(line for line in done.stdout.splitlines() if line.startswith("renders")).split()[1])
+    assert ends(number)
+    left = [path.name for path in tmp_path.rglob("*") if not path.name.startswith("pulse-")]
+    assert [name for name in left if not name.startswith("blender_")] == []
+    assert sum(name.startswith("blender_") for name in left) <= 1  # the parent's own
+
+
+@IS_POSIX
+def test_escape_while_the_world_renders_leaves_nothing(tmp_path, monkeypatch):
+    """Cycles writes tiles of large pictures into its folder."""
+    process.end()
+    monkeypatch.setattr(tempfile, "tempdir", str(tmp_path))
+    scenes.add_world()
+    with new_copy() as copy:
+        began = []
+
+        def stop(_fraction):
+            if process._kept._child.has_answered:
+                began.append(time.monotonic())
+            return not began or time.monotonic() - began[0] < 2
+
+        with pytest.raises(native.Cancelled):
+            process.run(copy, "world", LONG | {"width": 4096, "height": 2048}, stop)
+    assert [*tmp_path.iterdir()] == []
+
+
+@IS_POSIX
 def test_an_orphan_without_work_ends():
     program = [bpy.app.binary_path, "-b", "--factory-startup", "--python"] if bpy.app.binary_path else [sys.executable]
     child = subprocess.Popen([*program, str(process.CHILD), "--", "mark", "60"], stdin=subprocess.PIPE)

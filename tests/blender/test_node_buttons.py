@@ -158,7 +158,7 @@ class TestFromPrincipled:
         else:
             set_input(bsdf, 0.05, "Subsurface Scale")
             set_input(bsdf, 1.5, "IOR")
-            bsdf.subsurface_method = "RANDOM_WALK"
+            bsdf.subsurface_method = "RANDOM_WALK_LEGACY" if bpy.app.version >= (5, 2, 0) else "RANDOM_WALK"
         return bsdf
 
     def scale(self):

@@ -8,7 +8,7 @@ import bpy
 import scenes
 from beamspread.blender import compat, popup
 from beamspread.blender.images import icons
-from beamspread.blender.jobs.run import bake_run, operator
+from beamspread.blender.jobs.run import bake_run, run_operator
 from beamspread.blender.jobs.state import state
 from beamspread.blender.node import buttons, draw
 from beamspread.blender.ui import bake_panel as shown
@@ -234,7 +234,7 @@ def scenario():
         started()
         yield ended
         setattr(bake_run.BakeRun, where, works)
-        results["of errors"].append([results["popups"][before:], state.lines(), len(operator._timers)])
+        results["of errors"].append([results["popups"][before:], state.lines(), len(run_operator._timers)])
         results["after errors"] = [sorted(started())]
         yield ended
         results["after errors"].append(state.lines())

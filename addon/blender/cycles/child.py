@@ -157,7 +157,17 @@ class Requests(threading.Thread):
                     shutil.rmtree(folder, ignore_errors=True)
                 break
             time.sleep(0.05)
-        os._exit(0)
+        leave(0)
+
+
+def leave(code: int) -> None:
+    """End the process at once: some versions hang while they clean up.
+
+    Blender's own folder goes first: it lies among all temporary files if the parent had ended before Blender began.
+    """
+    if bpy.app.tempdir:
+        shutil.rmtree(bpy.app.tempdir, ignore_errors=True)
+    os._exit(code)
 
 
 def _wake_at_input() -> None:
@@ -227,4 +237,4 @@ if __name__ == "__main__":
     code = main()
     sys.stdout.flush()
     sys.stderr.flush()
-    os._exit(code)  # some versions hang while they clean up
+    leave(code)

@@ -16,6 +16,7 @@ import sys
 import threading
 import time
 import uuid
+import weakref
 from collections import deque
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
@@ -195,6 +196,8 @@ class _Child:
         self._process = subprocess.Popen(
             command, env=os.environ | places, encoding="utf-8", errors="replace", creationflags=hidden, **pipes
         )
+        # Where Python ends without `end`, the process goes before its folder: it would write into that meanwhile.
+        self._killer = weakref.finalize(self, _kill, self._process)
         self._finished = threading.Event()
         self._begin()
         self._listener = threading.Thread(target=self._listen, daemon=True)
@@ -229,9 +232,7 @@ class _Child:
 
     def end(self) -> None:
         """Kill the process if it still runs, and wait until all its output is read."""
-        if self.is_running():
-            self._process.kill()
-        self._process.wait()
+        self._killer()
         self._listener.join()
         with suppress(OSError):
             self._process.stdin.close()
@@ -255,6 +256,12 @@ class _Child:
         self._process.wait()
         self._folder.remove()
         self._finished.set()
+
+
+def _kill(process: subprocess.Popen) -> None:
+    if process.poll() is None:
+        process.kill()
+    process.wait()
 
 
 _kept = _Process()

@@ -34,9 +34,8 @@ def check_image(image) -> None:
     """Raise ImageError with one sentence if a bake could not be stored in the image."""
     name = f"The image '{image.name}'"
     if image.source == "SEQUENCE" and facts_of(image).frames:
-        raise ImageError(
-            f"{name} holds the frames of a batch.", "Use Show Single Images (Render > Beamspread > Animation) first."
-        )
+        where = "Render > Beamspread > Animation"
+        raise ImageError(f"{name} holds frames.", f"Use Bake Animation, or Show Single Images first ({where}).")
     if image.source not in {"FILE", "GENERATED", "TILED"}:
         raise ImageError(f"{name} is a sequence, movie or viewer.", "Choose a single image in the node.")
     if image.library is not None:

@@ -127,21 +127,34 @@ def find_frames(scene, target: Target) -> tuple[list[int], Path]:
     return numbers, path.with_name(f"{start}{numbers[0]:04d}{ending}") if numbers else path
 
 
-def show_frames(node, numbers: list[int], path: Path, side: str = FRONT) -> list[Message]:
-    """Have a side of the node show the sequence that begins with the file; messages as of `link_result`."""
+def show_frames(node, numbers: list[int], path: Path, side: str = FRONT, uv_map: str | None = None) -> list[Message]:
+    """Have a side of the node show the sequence that begins with the file. Map and messages are as of `link_result`."""
     shown = image_of_side(node, side)
-    former = (is_sequence(shown) and facts_of(shown).former) or shown
-    image = bpy.data.images.load(str(path))
-    size = tuple(image.size)  # a sequence has none
+    former = facts_of(shown).former if is_sequence(shown) else shown
+    first = bpy.data.images.load(str(path))
+    size = tuple(first.size)  # a sequence has none
+    image = shown if _is_sequence_of(shown, path) else first
+    if image != first:
+        bpy.data.images.remove(first)
     image.name = re.sub(r"_\d+$", "", path.stem) + " frames"
     image.source = "SEQUENCE"
     image.filepath = bpy.path.relpath(str(path)) if bpy.data.filepath else str(path)
+    image.reload()  # of a sequence that was shown before, files may be new
     facts = facts_of(image)
     facts.frames, facts.former = Frames(numbers[0], numbers[-1], *size), former
     set_facts(image, facts)
-    messages = link_result(node, image, side=side)
+    messages = link_result(node, image, uv_map, side=side)
     follow_frames(node.node_tree, image, numbers[0], numbers[-1])
     return messages
+
+
+def _is_sequence_of(image, path: Path) -> bool:
+    """True if an image is the sequence of the files that begin with this one."""
+    if not is_sequence(image):
+        return False
+    shown = files.file_of(image)
+    name = re.compile(re.escape(re.sub(r"_\d+$", "", path.stem)) + r"_\d+")
+    return (shown.parent, shown.suffix) == (path.parent, path.suffix) and name.fullmatch(shown.stem) is not None
 
 
 class BEAMSPREAD_OT_show_frames(bpy.types.Operator):

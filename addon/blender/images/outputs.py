@@ -92,7 +92,10 @@ class Outputs:
         options = self._options
         file_format, folder = self._format(), options.output or self._settings.output_dir
         if folder.startswith("//") and not bpy.data.filepath:
-            raise ImageError("The scene was never saved, so there is no folder to write to.", "Give one with --output.")
+            raise ImageError(
+                "The scene was never saved, so there is no folder to write to.",
+                "Save it, or choose another folder (--output).",
+            )
         if layer == DIRECTION and not file_format.startswith("EXR"):
             name = "An HDR file" if file_format == "HDR" else "A PNG"
             raise ImageError(f"{name} can't hold directions, which have negative parts.", "Choose EXR.")

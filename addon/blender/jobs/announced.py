@@ -278,6 +278,14 @@ def line_of(announced: dict[Target, Announced], targets: Iterable[Target]) -> st
     return f"{about} {duration(_total(chosen))}"
 
 
+def seconds_of_frames(announced: dict[Target, Announced], targets: Iterable[Target], count: int) -> float | None:
+    """Seconds of bakes of the targets at so many frames; None if that is not known of one of them."""
+    chosen = [announced.get(target) for target in targets]
+    if not chosen or None in chosen:
+        return None
+    return _total(chosen) + (count - 1) * sum(seconds_of(bake.steps) for bake in chosen)
+
+
 def simulation_line(announced: dict[Target, Announced], targets: Iterable[Target]) -> str:
     """Part of that time in which materials are simulated, and their names; "" if there is none."""
     simulations, names = {}, {}

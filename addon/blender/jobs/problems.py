@@ -6,6 +6,7 @@ import bpy
 
 from ...core.errors import BakeError, message_of
 from ...core.messages import Messages
+from ..images.facts import is_sequence
 from ..images.files import check_image
 from ..images.results import check_editable
 from ..node.find import find_misplaced, targets_of
@@ -31,7 +32,7 @@ def problems_of(obj, counts: dict[str, int]) -> Messages:
         ]
         if bpy.context.scene.beamspread.output == "LUMINANCE":
             checks.append(lambda target=target: check_editable(target.material))
-        if target.image is not None:
+        if target.image is not None and not is_sequence(target.image):  # its row says what it shows
             checks.append(lambda target=target: check_image(target.image))
         if target.name in state.refused:
             messages.add(message_of(state.refused[target.name], str(target.name)))

@@ -109,6 +109,7 @@ class State:
     rows : status of each target of the scene; `out_of_date.stale` keeps them up to date.
     announced : how long bakes of targets will take; so does this.
     refused : reasons why targets can't be baked that are known beforehand; so does this.
+    frozen : warnings about bakes that stand still while the light moves; and this.
     factors : estimates once a scene was read, relative to those without its meshes, by target and kind of step.
     """
 
@@ -117,6 +118,7 @@ class State:
         self.rows: dict[Target, Row] = {}
         self.announced: dict[Target, Announced] = {}
         self.refused: dict[Target, BakeError] = {}
+        self.frozen: tuple[Message, ...] = ()
         self.factors: dict[tuple[Target, str], float] = {}
         self._last: dict[Target, Row] = {}
 
@@ -172,6 +174,7 @@ class State:
         self.rows.clear()
         self.announced.clear()
         self.refused.clear()
+        self.frozen = ()
         self.factors.clear()
 
 

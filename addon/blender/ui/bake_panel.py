@@ -8,9 +8,10 @@ from collections.abc import Iterable
 from ...core import native
 from ...core.messages import Messages
 from .. import compat
-from ..jobs.announced import line_of, simulation_line, spread_lines
+from ..jobs.announced import line_of, seconds_of_frames, simulation_line, spread_lines
 from ..jobs.problems import problems_of
-from ..jobs.state import Row, Status, state
+from ..jobs.run.files_run import frames_of
+from ..jobs.state import Row, Status, duration, state
 from ..live import timer
 from ..node.find import find_targets, has_node, rendered_counts
 from ..popup import wrap
@@ -60,6 +61,7 @@ def draw_bake(layout, context, material_name: str = "") -> None:
         shown = draw_problems(layout, context)
         draw_buttons(layout, context)
         draw_announced(layout, context)
+        draw_lines(layout, context, map(str, state.frozen), "ERROR")
         row = layout.row()
         row.use_property_split = False  # as wide as the buttons above
         row.prop(context.scene.beamspread, "use_live", toggle=True, icon="PLAY")
@@ -114,6 +116,23 @@ def draw_announced(layout, context) -> None:
     draw_lines(layout, context, filter(None, [line, simulation]), "TIME")
     lines = spread_lines(state.announced, chosen)
     draw_lines(layout, context, lines, "MATERIAL")
+
+
+def draw_animation(layout, context) -> None:
+    """Draw Bake Animation with its frames, and how long it will take."""
+    settings, (first, last) = context.scene.beamspread, frames_of(context.scene)
+    column = layout.column(align=True)
+    column.operator("beamspread.bake_animation", icon="RENDER_ANIMATION")
+    column = layout.column(align=True)
+    column.prop(settings, "use_frame_range")
+    if settings.use_frame_range:
+        column.prop(settings, "frame_first")
+        column.prop(settings, "frame_last")
+    count = last - first + 1
+    chosen = find_targets(list(context.view_layer.objects.selected)[:MAX_ANNOUNCED]) or list(state.announced)
+    seconds = seconds_of_frames(state.announced, chosen, count) if count > 0 else None
+    text = f"Frames {first} to {last}"
+    draw_lines(layout, context, [text if seconds is None else f"{text}: about {duration(seconds)}"], "TIME")
 
 
 def draw_progress(layout, context) -> None:

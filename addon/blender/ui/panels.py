@@ -15,7 +15,7 @@ from ..node.draw import draw_properties
 from ..node.find import find_node, image_of
 from ..preferences import draw_help
 from ..registration import all_or_nothing, classes
-from .bake_panel import draw_bake, draw_lines
+from .bake_panel import draw_animation, draw_bake, draw_lines
 
 
 def _use_columns(layout) -> None:
@@ -197,6 +197,7 @@ class BEAMSPREAD_PT_batch(RenderPanel, bpy.types.Panel):
     def draw(self, context):
         layout = self.layout
         _use_columns(layout)
+        draw_animation(layout, context)
         layout.prop(context.scene.beamspread, "output_dir")
         layout.prop(context.scene.beamspread, "format")
         if context.scene.beamspread.format.startswith("PNG"):
@@ -205,6 +206,9 @@ class BEAMSPREAD_PT_batch(RenderPanel, bpy.types.Panel):
         column = layout.column(align=True)
         column.operator("beamspread.show_frames", icon="RENDER_ANIMATION")
         column.operator("beamspread.show_single", icon="IMAGE_DATA")
+        column = layout.column(align=True)
+        column.operator("beamspread.bake_files", icon="FILE_IMAGE")
+        column.operator("beamspread.copy_command", icon="COPYDOWN")
 
 
 class BEAMSPREAD_PT_render_with(RenderPanel, bpy.types.Panel):

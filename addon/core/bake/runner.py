@@ -121,15 +121,21 @@ class Sink:
         """Take note of a bake that has ended: written, failed or cancelled."""
 
 
-def run_in_steps(bakes: Iterable[Bake], sink: Sink) -> Iterator[None]:
-    """Run, store and note each bake. Yields whenever `sink.run` does, so that a host can go on in between."""
+def run_in_steps(bakes: Iterable[Bake | None], sink: Sink) -> Iterator[None]:
+    """Run, store and note each bake. Yields whenever `sink.run` does, so that a host can go on in between.
+
+    None among the bakes lets the host go on before the next one is prepared.
+    """
     for bake in bakes:
+        if bake is None:
+            yield
+            continue
         yield from sink.run(bake)
         bake.keep(sink.store)
         sink.end(bake)
 
 
-def run_bakes(bakes: Iterable[Bake], sink: Sink) -> None:
+def run_bakes(bakes: Iterable[Bake | None], sink: Sink) -> None:
     """Run, store and note each bake."""
     for _ in run_in_steps(bakes, sink):
         pass

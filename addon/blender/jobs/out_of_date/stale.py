@@ -36,6 +36,7 @@ from ...read.scene_cache import listeners
 from ...read.visibility import by_name, render_visible_names
 from ...registration import all_or_nothing, handlers
 from ..announced import MAX_TARGETS, announce
+from ..frozen import frozen
 from ..problems import problems_of
 from ..state import Row, Status, redraw, state
 from .fingerprint import IMAGE, QUALITY, Parts, fingerprints, image_part
@@ -71,6 +72,7 @@ def refresh(context) -> None:
         pace.recall(target.object_name, records[target].ratios)
     now = fingerprints(context, recorded) if recorded else {}
     state.announced = announce(context, list(images))
+    state.frozen = frozen(context.scene, list(images))
     rows = {target: _row(target, image, records[target], now.get(target)) for target, image in images.items()}
     problems = _problems(context, list(images))
     rows = {target: _with_problems(row, problems.get(target, ())) for target, row in rows.items()}

@@ -108,7 +108,7 @@ class BakeRun(Sink):
             if step.purpose != Pass.PREVIEW:
                 announced.compare(step.plan.target, estimates)
 
-    def bakes(self) -> Iterator[Bake]:
+    def bakes(self) -> Iterator[Bake | None]:
         """The bakes in their order, until the run is cancelled."""
         for number, step in enumerate(self._steps, 1):
             self._number = number
@@ -122,16 +122,20 @@ class BakeRun(Sink):
     def run(self, bake: Bake) -> Iterator[None]:
         if bake.job is None:
             return
-        count, progress = len(self._steps), self._shares[self._number - 1]
+        progress = self._shares[self._number - 1]
         if not self._in_window:
             bake.run(progress)
             return
-        state.start(self._progress, bake.target, f"{self._number} of {count}" if count > 1 else "")
+        state.start(self._progress, bake.target, self._position())
         thread = BakeThread(bake, progress)
         thread.start()
         yield  # also if it has ended: only the modal part of an operator makes an undo step for scripts
         while thread.is_alive():
             yield
+
+    def _position(self) -> str:
+        """Number of the current bake and of all bakes; "" if there is one."""
+        return f"{self._number} of {len(self._steps)}" if len(self._steps) > 1 else ""
 
     def store(self, bake: Bake) -> str:
         return self._results.store(bake)
@@ -155,6 +159,17 @@ class BakeRun(Sink):
                 self.fail(message)
         for message in bake.messages.of(Level.WARNING, Level.INFO):
             self.report(message)
+
+    def close(self) -> None:
+        """End the run, also after an error."""
+
+    def is_successful(self) -> bool:
+        """True if the run has results."""
+        return bool(self.written)
+
+    def summary(self) -> str:
+        """The results of the run in one line."""
+        return f"Baked {', '.join(map(str, dict.fromkeys(self.written)))}"
 
     def fail(self, message: Message) -> None:
         self.report(message)

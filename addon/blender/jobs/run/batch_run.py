@@ -5,7 +5,6 @@ from __future__ import annotations
 import logging
 import sys
 from collections.abc import Iterator
-from dataclasses import replace
 from functools import partial
 from pathlib import Path
 
@@ -19,7 +18,6 @@ from ....core.batch.stop import Stop
 from ....core.errors import BakeError
 from ....core.progress import Progress, log, timed
 from ....core.target import Target
-from ...images.facts import attributes_of, record_of_bake
 from ...images.files import file_of, size_of
 from ...images.outputs import Outputs
 from ...images.udim import tiles_path
@@ -31,6 +29,7 @@ from ...read.visibility import by_name
 from ..out_of_date import stale
 from ..out_of_date.fingerprint import IMAGE, SETTINGS, Parts, settings_part
 from .bake_plan import prepare_scene
+from .files_run import frame_attributes
 
 
 def bake_all(options: BatchOptions, stop: Stop | None = None) -> Report:
@@ -114,7 +113,7 @@ class _Batch(Sink):
     def store(self, bake: Bake) -> str:
         # The size of the image is no part of a sequence.
         parts = {name: digest for name, digest in self._parts.get(bake.target, {}).items() if name != IMAGE}
-        attributes = attributes_of(replace(record_of_bake(bake, parts), notes=(), ratios={})) if parts else {}
+        attributes = frame_attributes(bake, parts)
         node = node_of(bake.target)
         if self._options.save and self._settings.layer == COMBINED and node is not None and node.node_tree is not None:
             keep_map(node.node_tree, bake.job.receiver.uv_map)
