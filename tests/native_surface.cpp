@@ -24,7 +24,7 @@ public:
     {
         RadialProfile sum;
         const std::vector<RadialProfile> nodes = node_profiles(albedo, side);
-        const AngleWeights weights = angle_weights(angle_deg);
+        const AngleWeights weights = angle_weights(angle_deg, side);
         for (std::size_t j = 0; j < nodes.size(); ++j)
             sum.add(nodes[j], weights.even[j], weights.odd[j]);
         return sum;
@@ -60,7 +60,7 @@ public:
         return nodes;
     }
 
-    AngleWeights angle_weights(double angle_deg) const override
+    AngleWeights angle_weights(double angle_deg, Side /*side*/) const override
     {
         AngleWeights weights{std::vector<double>(node_angles.size()), {}, {}};
         const double step = node_angles[1];
@@ -96,12 +96,12 @@ class HeldField {
 public:
     HeldField(const py::array& samples, const Sources& ldf, const std::vector<double>& albedo,
               const std::vector<double>& mean_free_path, double tolerance, double max_angle, bool is_colored,
-              int threads, std::size_t max_moment_bytes, bool is_direct)
+              int threads, std::size_t max_moment_bytes, bool is_direct, const std::string& side)
         : m_samples(samples), m_ldf(ldf)
     {
         SurfaceProblem problem;
         problem.samples = to_rows<SurfaceSample, float>("samples", samples, "contiguous float32 (N, 10)");
-        problem.channels = media_of(ldf, albedo, mean_free_path);
+        problem.channels = media_of(ldf, albedo, mean_free_path, side);
         problem.tolerance = tolerance;
         problem.max_angle_deg = max_angle;
         problem.is_colored = is_colored;
@@ -154,10 +154,11 @@ void bind_surface(py::module_& m)
         .def(py::init<std::vector<double>>(), py::arg("curvatures"));
     py::class_<HeldField>(m, "SurfaceField", "Light on samples of a surface, by the solver `surface`.")
         .def(py::init<const py::array&, const Sources&, const std::vector<double>&, const std::vector<double>&, double,
-                      double, bool, int, std::size_t, bool>(),
+                      double, bool, int, std::size_t, bool, const std::string&>(),
              py::arg("samples"), py::arg("ldf"), py::arg("albedo"), py::arg("mean_free_path"),
              py::arg("tolerance") = 1e-3, py::arg("max_angle") = 88.0, py::arg("is_colored") = false,
              py::arg("threads") = 0, py::arg("max_moment_bytes") = 0, py::arg("is_direct") = false,
+             py::arg("side") = "reflected",
              "`samples`: float32 (N, 10), position, normal, tangent and area.")
         .def("add", &HeldField::add, py::arg("travel"), py::arg("irradiance"), py::arg("color"), py::arg("first") = 0,
              "Add a ray to each of the samples from `first` on: float32 (N, 3) in their frames and channels.")

@@ -40,9 +40,9 @@ constexpr double max_padding = 6.0;
 double reach(const ChannelMedium& medium)
 {
     double paths = 0.0;
-    for (const RadialProfile& profile : medium.ldf->node_profiles(medium.albedo, Side::reflected))
+    for (const RadialProfile& profile : medium.ldf->node_profiles(medium.albedo, medium.side))
         paths = std::max(paths, profile.reach(max_beyond));
-    for (const BallisticExit& exit : medium.ldf->ballistic(grazing, Side::reflected))
+    for (const BallisticExit& exit : medium.ldf->ballistic(grazing, medium.side))
         if (exit.power > max_beyond)
             paths = std::max(paths, exit.u);
     return paths * medium.mean_free_path;

@@ -158,9 +158,9 @@ BakeOptions options_of(int samples, int rays, std::uint32_t seed, int threads)
 
 HeldField make_field(std::pair<std::size_t, std::size_t> shape, const Sources& ldf, const std::vector<double>& albedo,
                      const std::vector<double>& mean_free_path, std::array<double, 2> pitch, double max_angle,
-                     double tolerance, bool is_colored, int threads)
+                     double tolerance, bool is_colored, int threads, const std::string& side)
 {
-    const std::vector<ChannelMedium> media = media_of(ldf, albedo, mean_free_path);
+    const std::vector<ChannelMedium> media = media_of(ldf, albedo, mean_free_path, side);
     const Plane plane{shape.second, shape.first, pitch[0], pitch[1]};
     const py::gil_scoped_release release;
     return {ldf, any_light_field(plane, media, max_angle, tolerance, is_colored, threads)};
@@ -173,9 +173,9 @@ std::vector<Array<float>> luminance(const std::vector<const HeldSurface*>& held,
                                     double tolerance, int samples, int rays, int min_rays, std::uint32_t seed,
                                     int threads, std::size_t max_stored_bytes, std::size_t memory_limit,
                                     const py::object& progress, const py::object& report_noise,
-                                    const py::object& report_beyond)
+                                    const py::object& report_beyond, const std::string& side)
 {
-    const std::vector<ChannelMedium> media = media_of(ldf, albedo, mean_free_path);
+    const std::vector<ChannelMedium> media = media_of(ldf, albedo, mean_free_path, side);
     const std::vector<ArrivingLights> lights = arriving_lights(light_tuples, held.size());
     RayNoise noise;
     std::vector<double> beyond_shares;
@@ -313,7 +313,7 @@ ValueError
           py::arg("rays") = 256, py::arg("min_rays") = BakeOptions().min_rays, py::arg("seed") = 0,
           py::arg("threads") = 0, py::arg("max_stored_bytes") = BakeOptions().max_stored_bytes,
           py::arg("memory_limit") = 0, py::arg("progress") = py::none(), py::arg("report_noise") = py::none(),
-          py::arg("report_beyond") = py::none(),
+          py::arg("report_beyond") = py::none(), py::arg("side") = "reflected",
           R"(Luminance of translucent surfaces: the engine behind `beamspread.core.bake`.
 
 Parameters
@@ -348,6 +348,8 @@ report_noise : callable, optional
     in a texel, (W/m^2)^2. The latter comes from two halves of the rays to lights of a size.
 report_beyond : callable, optional
     report_beyond(shares) takes the share of each surface's area that bends more than the LDFs cover; 0 on planes.
+side : {"reflected", "transmitted"}
+    Side of the luminance: where light enters, or the far side of a slab, at the same texels.
 
 Returns
 -------
@@ -380,10 +382,12 @@ is_colored : bool
     True if lights may differ in color.
 threads : int
     0: all.
+side : {"reflected", "transmitted"}
+    Side of the luminance: where light enters, or the far side of a slab, at the same texels.
 )")
         .def(py::init(&make_field), py::arg("shape"), py::arg("ldf"), py::arg("albedo"), py::arg("mean_free_path"),
              py::arg("pitch"), py::arg("max_angle"), py::arg("tolerance"), py::arg("is_colored"),
-             py::arg("threads") = 0)
+             py::arg("threads") = 0, py::arg("side") = "reflected")
         .def("luminance", &field_luminance, py::arg("surface"), py::arg("lights"), py::arg("samples") = 4,
              py::arg("rays") = 256, py::arg("seed") = 0, py::arg("threads") = 0, py::arg("progress") = py::none(),
              "Luminance as of `bake_luminance`, by `rays` rays from each texel to each light of a size.")

@@ -14,15 +14,19 @@ namespace beamspread {
 
 using Sources = std::vector<std::shared_ptr<LdfSource>>;
 
-// The media do not own the sources. Throws InvalidArgument if the sequences differ in length.
+// The media do not own the sources. Throws InvalidArgument if the sequences differ in length, or if a source does not know
+// the side's light.
 inline std::vector<ChannelMedium> media_of(const Sources& ldf, const std::vector<double>& albedo,
-                                           const std::vector<double>& mean_free_path)
+                                           const std::vector<double>& mean_free_path, const std::string& side)
 {
+    const Side leaving = side_from_name(side);
     if (ldf.size() != albedo.size() || mean_free_path.size() != albedo.size())
         reject("ldf", "of another number of channels than albedo", "one per channel");
     std::vector<ChannelMedium> media;
-    for (std::size_t c = 0; c < albedo.size(); ++c)
-        media.push_back({ldf[c].get(), albedo[c], mean_free_path[c]});
+    for (std::size_t c = 0; c < albedo.size(); ++c) {
+        ldf[c]->check_side(leaving);
+        media.push_back({ldf[c].get(), albedo[c], mean_free_path[c], leaving});
+    }
     return media;
 }
 
@@ -51,11 +55,12 @@ inline Plane plane_of(const Lights& lights, std::array<double, 2> pitch)
 }
 
 inline Problem problem_of(const Lights& lights, const Sources& ldf, const std::vector<double>& albedo,
-                          const std::vector<double>& mean_free_path, std::array<double, 2> pitch, double tolerance)
+                          const std::vector<double>& mean_free_path, std::array<double, 2> pitch, double tolerance,
+                          const std::string& side = "reflected")
 {
     Problem problem;
     problem.plane = plane_of(lights, pitch);
-    problem.channels = media_of(ldf, albedo, mean_free_path);
+    problem.channels = media_of(ldf, albedo, mean_free_path, side);
     for (const HeldLight* held : lights)
         problem.lights.push_back(held->light);
     problem.tolerance = tolerance;

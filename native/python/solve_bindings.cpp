@@ -64,9 +64,9 @@ std::vector<HeldLight> lights_of(const Plane2D& irradiance, const Array<float>& 
 Array<float> convolve(const Lights& lights, const Sources& ldf, const std::vector<double>& albedo,
                       const std::vector<double>& mean_free_path, std::array<double, 2> pitch, const std::string& solver,
                       double tolerance, int threads, const py::object& progress, std::size_t memory,
-                      std::size_t coarsening)
+                      std::size_t coarsening, const std::string& side)
 {
-    Problem problem = problem_of(lights, ldf, albedo, mean_free_path, pitch, tolerance);
+    Problem problem = problem_of(lights, ldf, albedo, mean_free_path, pitch, tolerance, side);
     problem.solver = named_solver(solver);
     problem.threads = threads;
     problem.memory = memory;
@@ -128,12 +128,14 @@ color : sequence of float
     m.def("convolve", &convolve, py::arg("lights"), py::arg("ldf"), py::arg("albedo"), py::arg("mean_free_path"),
           py::arg("pitch"), py::arg("solver"), py::arg("tolerance"), py::arg("threads"), py::arg("progress"),
           py::arg("memory") = Problem().memory, py::arg("coarsening") = Problem().coarsening,
+          py::arg("side") = "reflected",
           R"(Luminance of lights on a grid; the engine behind `beamspread.convolve`.
 
 C libraries, albedos and mean free paths (metres), pitch (x, y) in metres; returns float32 (H, W, C) in W/(m^2 sr).
 `memory`: bytes that the spectra of the solver 'fft' may take; where the whole plane needs more it is solved in tiles.
 `coarsening`: texels from node to node of the grid on which it spreads light far: 4, 8, 16, ... 64, 1 for no such grid,
 0 for what costs least.
+`side`: of the luminance, 'reflected' where light enters or 'transmitted' at the same texels of a slab's far side.
 )");
     m.def("adaptive_beams", &adaptive_beams, py::arg("light"), py::arg("tolerance"),
           R"(Squares that the adaptive solver lights by one beam each; the engine behind `beamspread.adaptive_beams`.

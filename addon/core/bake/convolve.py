@@ -36,6 +36,7 @@ def luminance(
     tolerance: float = 1e-3,
     threads: int = 0,
     progress: Callback | None = None,
+    side: str = "reflected",
 ) -> NDArray[np.float32]:
     """Luminance that beams on a regular grid cause on a plane of a material.
 
@@ -44,7 +45,7 @@ def luminance(
 
     Parameters
     ----------
-    irradiance, direction, pitch, solver, tolerance, threads, progress
+    irradiance, direction, pitch, solver, tolerance, threads, progress, side
         As for `convolve`.
     material : Material
         From `presets`, or made by hand.
@@ -89,6 +90,7 @@ def luminance(
         tolerance,
         threads,
         solving,
+        side=side,
     )
 
 
@@ -104,6 +106,7 @@ def convolve(
     threads: int = 0,
     progress: Callback | None = None,
     interpolation: str = "angular",
+    side: str = "reflected",
 ) -> NDArray[np.float32]:
     """Luminance that beams on a regular grid of a plane cause (Manabe et al. 2012, Eq. 2).
 
@@ -138,6 +141,10 @@ def convolve(
         Called with the finished fraction; returning False stops.
     interpolation : {"angular", "adaptive", "planar"}
         Method of `interpolate` between samples.
+    side : {"reflected", "transmitted"}
+        Side of the luminance: where light enters, or the far side of a slab, at the texels opposite the lit ones.
+        Unscattered light that crosses the slab is included. Rows, columns and directions stay those of the lit side.
+        Half-spaces and samples know no far side.
 
     Returns
     -------
@@ -153,7 +160,7 @@ def convolve(
     """
     light = irradiance, direction
     return convolve_lights(
-        [light], ldf, albedo, mean_free_path, pitch, solver, tolerance, threads, progress, interpolation
+        [light], ldf, albedo, mean_free_path, pitch, solver, tolerance, threads, progress, interpolation, side
     )
 
 
@@ -168,6 +175,7 @@ def convolve_lights(
     threads: int = 0,
     progress: Callback | None = None,
     interpolation: str = "angular",
+    side: str = "reflected",
 ) -> NDArray[np.float32]:
     """Luminance of several lights together: the sum of the results of `convolve` for each.
 
@@ -198,6 +206,7 @@ def convolve_lights(
         float(tolerance),
         int(threads),
         progress,
+        side=side,
     )
 
 

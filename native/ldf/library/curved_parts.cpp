@@ -110,7 +110,7 @@ std::vector<RadialProfile> LdfLibrary::curved_node_profiles(double albedo, Side 
 
 RadialProfile LdfLibrary::curved_profile(double angle_deg, double albedo, Side side, double curvature) const
 {
-    const AngleWeights weights = angle_weights(angle_deg);
+    const AngleWeights weights = angle_weights(angle_deg, side);
     RadialProfile sum;
     for (const CurvatureWeight& node : curvature_weights(curvature))
         if (node.weight != 0.0)

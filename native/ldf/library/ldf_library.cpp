@@ -20,6 +20,10 @@ namespace {
 // Larger: smaller errors near grazing, but libraries must reach this angle.
 constexpr double grazing_deg = 88.0;
 
+// Thickness, mean free paths, up to which light leaves the far side of a slab so sharply that profiles around the entry
+// need nodes four times as close as the simulated angles, in place of twice. Larger: smaller errors, more time.
+constexpr double max_sharp_exit = 4.0;
+
 // Fraction of a profile's power that its dropped trailing harmonics may move. Larger: less time, larger errors.
 constexpr double negligible_harmonics = 1e-4;
 
@@ -86,8 +90,11 @@ LdfLibrary::LdfLibrary(const Medium& medium, std::uint64_t photons, std::uint64_
     for (const AngleResult& result : m_results)
         angles.push_back(result.angle_deg);
     m_simulated = AngleNodes(std::move(angles));
-    // Mirror images move from node to node, hence profiles around one pole need closer nodes.
-    m_nodes = used_poles(medium) > 1 ? AngleNodes(with_middles(angles_deg())) : m_simulated;
+    // Displaced poles move from node to node, hence profiles around the entry need closer nodes.
+    const AngleNodes closer(with_middles(angles_deg()));
+    const bool has_sharp_exit = medium.thickness <= max_sharp_exit;
+    m_nodes = {used_poles(medium) > 1 ? closer : m_simulated,
+               has_sharp_exit ? AngleNodes(with_middles(closer.angles_deg())) : closer};
 }
 
 void LdfLibrary::check_angle(double angle_deg) const
@@ -104,15 +111,21 @@ void LdfLibrary::check_angle(double angle_deg) const
     }
 }
 
+void LdfLibrary::check_side(Side side) const
+{
+    if (side == Side::transmitted && m_medium.is_half_space())
+        reject("side", "'transmitted'", "'reflected' for LDFs of a half-space, which has no far side");
+}
+
 double LdfLibrary::entry_transmittance(double angle_deg) const
 {
     return 1.0 - fresnel(std::cos(angle_deg * radians_per_degree), m_medium.ior);
 }
 
-LdfLibrary::AngleWeights LdfLibrary::angle_weights(double angle_deg) const
+LdfLibrary::AngleWeights LdfLibrary::angle_weights(double angle_deg, Side side) const
 {
     check_angle(angle_deg);
-    return m_nodes.weights(angle_deg, entry_transmittance(angle_deg));
+    return m_nodes[static_cast<std::size_t>(side)].weights(angle_deg, entry_transmittance(angle_deg));
 }
 
 LdfLibrary::AngleWeights LdfLibrary::simulated_weights(double angle_deg) const
@@ -158,16 +171,15 @@ RadialProfile LdfLibrary::interpolated(double angle_deg, Side side, std::size_t 
 std::vector<RadialProfile> LdfLibrary::node_profiles(double albedo, Side side) const
 {
     const std::vector<PoleProfiles> poles = simulated_profiles(albedo, side);
-    if (poles.size() == 1)
+    if (poles.size() == 1 && side == Side::reflected)
         return poles.front();
-    std::vector<RadialProfile> profiles(m_nodes.count());
+    const AngleNodes& nodes = m_nodes[static_cast<std::size_t>(side)];
+    std::vector<RadialProfile> profiles(nodes.count());
     parallel_for(profiles.size(), [&](std::size_t j) {
-        const double angle = m_nodes.angles_deg()[j];
+        const double angle = nodes.angles_deg()[j];
         const AngleWeights weights = m_simulated.weights(angle, 1.0);
-        profiles[j] = interpolated(angle, side, 0, poles.front(), weights);
-        for (std::size_t pole = 1; pole < poles.size(); ++pole)
-            profiles[j].add(recentred(interpolated(angle, side, pole, poles[pole], weights), profiles[j].centre()), 1.0,
-                            1.0);
+        for (std::size_t pole = 0; pole < poles.size(); ++pole)
+            profiles[j].add(recentred(interpolated(angle, side, pole, poles[pole], weights), 0.0), 1.0, 1.0);
         profiles[j].drop_negligible(negligible_harmonics);
     });
     return profiles;
@@ -175,7 +187,9 @@ std::vector<RadialProfile> LdfLibrary::node_profiles(double albedo, Side side) c
 
 RadialProfile LdfLibrary::profile(double angle_deg, double albedo, Side side) const
 {
-    return interpolated(angle_deg, side, 0, node_profiles(albedo, side), angle_weights(angle_deg));
+    RadialProfile sum = interpolated(angle_deg, side, 0, node_profiles(albedo, side), angle_weights(angle_deg, side));
+    sum.set_centre(0.0);
+    return sum;
 }
 
 std::vector<RadialProfile> LdfLibrary::pole_profiles(double angle_deg, double albedo, Side side,

@@ -136,10 +136,10 @@ public:
     std::vector<RadialProfile> pole_profiles(double angle_deg, double albedo, Side side,
                                              std::optional<std::size_t> group = {}) const;
 
-    // Profiles around the first pole, per unit power that *entered*: `angle_weights` include the Fresnel transmittance
-    // at entry. Nodes are the simulated angles, and the middles between them if the beam has mirror images.
+    // Profiles around the entry, per unit power that *entered*: `angle_weights` include the Fresnel transmittance at
+    // entry. Nodes are the simulated angles, and angles between them where poles move along the beam.
     std::vector<RadialProfile> node_profiles(double albedo, Side side) const override;
-    AngleWeights angle_weights(double angle_deg) const override;
+    AngleWeights angle_weights(double angle_deg, Side side) const override;
 
     // Curved parts, by ascending curvatures.
     const std::vector<CurvedPart>& curved() const { return m_curved; }
@@ -155,6 +155,9 @@ public:
 
     // Throws InvalidArgument if the library does not reach to this angle.
     void check_angle(double angle_deg) const override;
+
+    // Throws InvalidArgument for the far side of a half-space.
+    void check_side(Side side) const override;
 
 private:
     using PoleProfiles = std::vector<RadialProfile>;  // of the simulated angles
@@ -194,7 +197,7 @@ private:
     std::vector<AngleResult> m_results;  // ascending angles
     std::vector<SideResiduals> m_residuals;
     AngleNodes m_simulated;
-    AngleNodes m_nodes;  // of `node_profiles`
+    std::array<AngleNodes, side_count> m_nodes;  // of `node_profiles`
     std::vector<CurvedPart> m_curved;
 };
 

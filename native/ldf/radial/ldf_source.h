@@ -16,7 +16,8 @@ class LdfSource {
 public:
     virtual ~LdfSource() = default;
 
-    // The scattered part of the LDF, per unit incident power. Throws InvalidArgument.
+    // The scattered part of the LDF around the point of entry, of either side, per unit incident power. Throws
+    // InvalidArgument.
     virtual RadialProfile profile(double angle_deg, double albedo, Side side) const = 0;
 
     // Profiles at the angles of all nodes, for solvers that need many angles at once. `profile` is their sum weighted
@@ -46,10 +47,13 @@ public:
             return std::max(nodes[neighbours[0]].harmonics(), nodes[neighbours[1]].harmonics());
         }
     };
-    virtual AngleWeights angle_weights(double angle_deg) const = 0;
+    virtual AngleWeights angle_weights(double angle_deg, Side side) const = 0;
 
     // The unscattered light, per unit incident power; empty if the profiles include it.
     virtual std::vector<BallisticExit> ballistic(double /*angle_deg*/, Side /*side*/) const { return {}; }
+
+    // Throws InvalidArgument for a side on which the source knows no light.
+    virtual void check_side(Side /*side*/) const {}
 
     // Throws InvalidArgument for an angle outside the source's range.
     virtual void check_angle(double angle_deg) const = 0;

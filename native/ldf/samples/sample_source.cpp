@@ -143,6 +143,12 @@ void SampleSource::check_angle(double angle_deg) const
     reject("angle", angle_deg, span.str());
 }
 
+void SampleSource::check_side(Side side) const
+{
+    if (side != Side::reflected)
+        reject("side", "'transmitted'", "'reflected' for LDF samples, which don't know the light of the far side");
+}
+
 RadialProfile SampleSource::at_node(double angle_deg, double albedo) const
 {
     const std::pair key(angle_deg, albedo);
@@ -171,7 +177,7 @@ std::vector<RadialProfile> SampleSource::node_profiles(double albedo, Side) cons
     return profiles;
 }
 
-LdfSource::AngleWeights SampleSource::angle_weights(double angle_deg) const
+LdfSource::AngleWeights SampleSource::angle_weights(double angle_deg, Side /*side*/) const
 {
     check_angle(angle_deg);
     std::vector<double> weights(m_angles.size(), 0.0);

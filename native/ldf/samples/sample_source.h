@@ -21,11 +21,13 @@ public:
     // Takes samples as `interpolate` does, all of the same g. Throws InvalidArgument.
     SampleSource(std::vector<LdfSample> samples, Interpolation method);
 
-    // Ignores the side: samples have one.
     RadialProfile profile(double angle_deg, double albedo, Side side) const override;
     std::vector<RadialProfile> node_profiles(double albedo, Side side) const override;
-    AngleWeights angle_weights(double angle_deg) const override;
+    AngleWeights angle_weights(double angle_deg, Side side) const override;
     void check_angle(double angle_deg) const override;
+
+    // Throws InvalidArgument for the far side: samples are of light that leaves where it enters.
+    void check_side(Side side) const override;
 
 private:
     RadialProfile at_node(double angle_deg, double albedo) const;

@@ -123,7 +123,7 @@ std::vector<AngleLight> by_angle(const Plane& plane, const PlaneLight& light, co
     std::vector<AngleLight> lights;
     for (const auto& [power, most_grazing] : bins)
         if (power > 0.0)
-            lights.push_back({medium.ldf->profile(angle_deg(most_grazing), medium.albedo, Side::reflected), power});
+            lights.push_back({medium.ldf->profile(angle_deg(most_grazing), medium.albedo, medium.side), power});
     return lights;
 }
 

@@ -54,7 +54,7 @@ struct Beam {
 };
 
 // Beams of the lit texels of each row.
-std::vector<std::vector<Beam>> beam_rows(const Plane& plane, const PlaneLight& light, const LdfSource& ldf,
+std::vector<std::vector<Beam>> beam_rows(const Plane& plane, const PlaneLight& light, const ChannelMedium& medium,
                                          Progress& progress)
 {
     std::vector<std::vector<Beam>> rows(plane.height);
@@ -68,7 +68,7 @@ std::vector<std::vector<Beam>> beam_rows(const Plane& plane, const PlaneLight& l
             const double beta = azimuth(direction);
             rows[y].push_back({x, irradiance, std::cos(beta), std::sin(beta), {}});
             if (!uniform)
-                rows[y].back().weights = ldf.angle_weights(incidence_deg(direction));
+                rows[y].back().weights = medium.ldf->angle_weights(incidence_deg(direction), medium.side);
         }
         progress.advance(0.0);
     });
@@ -175,12 +175,12 @@ std::vector<double> solve_direct(const Plane& plane, const PlaneLight& light, co
     const auto* uniform = std::get_if<OneDirection>(&light.directions);
     const LdfSource& ldf = *medium.ldf;
     const std::vector<RadialProfile> profiles =
-        uniform != nullptr ? std::vector{ldf.profile(incidence_deg(uniform->travel), medium.albedo, Side::reflected)}
-                           : ldf.node_profiles(medium.albedo, Side::reflected);
+        uniform != nullptr ? std::vector{ldf.profile(incidence_deg(uniform->travel), medium.albedo, medium.side)}
+                           : ldf.node_profiles(medium.albedo, medium.side);
     const std::vector<Term> terms = basis_terms(uniform, profiles);
     // Progress of one pair of rows.
     const double work = 1.0 / (static_cast<double>(plane.height) * static_cast<double>(plane.height));
-    const std::vector<std::vector<Beam>> beams = beam_rows(plane, light, ldf, progress);
+    const std::vector<std::vector<Beam>> beams = beam_rows(plane, light, medium, progress);
 
     std::vector<double> sum(plane.width * plane.height);
     const auto add_row = [&](std::size_t target, std::size_t source, const std::vector<double>* kernels) {

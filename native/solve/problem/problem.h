@@ -93,11 +93,12 @@ double azimuth(const Vec3& travel);
 // Angle of incidence in degrees from tan(theta / 2).
 double angle_deg(double half_tangent);
 
-// The medium of a color channel.
+// The medium of a color channel, and the side that light leaves.
 struct ChannelMedium {
     const LdfSource* ldf = nullptr;
     double albedo = 0.0;
     double mean_free_path = 1.0;  // metres
+    Side side = Side::reflected;  // of the luminance: where light enters, or the far side of a slab
 
     bool operator==(const ChannelMedium&) const = default;
 };

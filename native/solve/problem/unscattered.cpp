@@ -32,7 +32,7 @@ public:
     ExitTable(const Plane& plane, const ChannelMedium& medium, std::pair<float, float> half_tangents)
     {
         const auto [first, last] = half_tangents;
-        if (first > last || medium.ldf->ballistic(angle_deg(first), Side::reflected).empty())
+        if (first > last || medium.ldf->ballistic(angle_deg(first), medium.side).empty())
             return;  // all angles have exits, or none
         const double outside = 2.0 * (static_cast<double>(plane.width) * plane.pitch_x +
                                       static_cast<double>(plane.height) * plane.pitch_y);
@@ -40,7 +40,7 @@ public:
         m_per_step = last > first ? static_cast<float>(table_steps) / (last - first) : 0.0f;
         for (std::size_t i = 0; i <= table_steps; ++i) {
             const double t = first + (last - first) * static_cast<double>(i) / static_cast<double>(table_steps);
-            const auto exits = medium.ldf->ballistic(angle_deg(t), Side::reflected);
+            const auto exits = medium.ldf->ballistic(angle_deg(t), medium.side);
             for (std::size_t k = 0; k < exits.size(); ++k) {
                 if (k == m_exits.size() && exits[k].power >= negligible_power)
                     m_exits.emplace_back(table_steps + 1);

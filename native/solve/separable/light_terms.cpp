@@ -52,7 +52,7 @@ void add_direction(LightTerms& terms, const Vec3& travel, const std::vector<std:
 {
     const std::size_t first_profile = terms.profiles.size();
     for (const ChannelMedium& medium : terms.sets.media) {
-        ScaledProfile profile{medium.ldf->profile(incidence_deg(travel), medium.albedo, Side::reflected),
+        ScaledProfile profile{medium.ldf->profile(incidence_deg(travel), medium.albedo, medium.side),
                               medium.mean_free_path, 0.0};
         constexpr double max_beyond = 1e-6;  // fraction of power; smaller: smaller errors of suns, more padding
         profile.reach = profile.profile.reach(std::min(beyond, max_beyond)) * medium.mean_free_path;

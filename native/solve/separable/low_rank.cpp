@@ -5,6 +5,7 @@
 #include <cmath>
 #include <map>
 #include <numeric>
+#include <utility>
 
 #include <Eigen/Dense>
 
@@ -38,10 +39,11 @@ Eigen::Index index(std::size_t i)
 class NodeWeights {
 public:
     NodeWeights() = default;
-    NodeWeights(const LdfSource& library, const std::vector<double>& half_tangents) : m_weights(half_tangents.size())
+    NodeWeights(const ChannelMedium& medium, const std::vector<double>& half_tangents) : m_weights(half_tangents.size())
     {
-        parallel_for(half_tangents.size(),
-                     [&](std::size_t a) { m_weights[a] = library.angle_weights(angle_deg(half_tangents[a])); });
+        parallel_for(half_tangents.size(), [&](std::size_t a) {
+            m_weights[a] = medium.ldf->angle_weights(angle_deg(half_tangents[a]), medium.side);
+        });
     }
 
     // Weights of a harmonic, [angle][node].
@@ -95,9 +97,9 @@ AngularMedium angular_medium(const ChannelMedium& channel, const Incidence& inci
                              const std::vector<double>& angles, double texel)
 {
     AngularMedium medium;
-    medium.nodes = channel.ldf->node_profiles(channel.albedo, Side::reflected);
+    medium.nodes = channel.ldf->node_profiles(channel.albedo, channel.side);
     const std::size_t nodes = medium.nodes.size();
-    medium.weights = NodeWeights(*channel.ldf, angles);
+    medium.weights = NodeWeights(channel, angles);
     const Vector share = Eigen::Map<const Vector>(incidence.share.data(), index(angle_count));
     const Vector mean_weights = medium.weights.of(0, medium.nodes).transpose() * share;
     for (std::size_t j = 0; j < nodes; ++j)
@@ -146,7 +148,7 @@ struct KernelDecomposition::Angular {
     std::vector<AngularMedium> media;
     std::vector<Vector> direction;  // [term]: unit vectors over the present angles
     Vector root_share;
-    std::map<const LdfSource*, NodeWeights> tables;
+    std::map<std::pair<const LdfSource*, Side>, NodeWeights> tables;
 };
 
 KernelDecomposition::KernelDecomposition(const Incidence& incidence, const std::vector<ChannelMedium>& media,
@@ -160,8 +162,9 @@ KernelDecomposition::KernelDecomposition(const Incidence& incidence, const std::
     const std::vector<double> angles = evenly_spaced(m_first, m_last, angle_count);
     for (const ChannelMedium& medium : media) {
         m_angular->media.push_back(angular_medium(medium, incidence, angles, texel));
-        if (!m_angular->tables.contains(medium.ldf))
-            m_angular->tables[medium.ldf] = NodeWeights(*medium.ldf, evenly_spaced(m_first, m_last, table_steps + 1));
+        const std::pair source(medium.ldf, medium.side);
+        if (!m_angular->tables.contains(source))
+            m_angular->tables[source] = NodeWeights(medium, evenly_spaced(m_first, m_last, table_steps + 1));
     }
     const Vector root_share = Eigen::Map<const Vector>(incidence.share.data(), index(angle_count)).cwiseSqrt();
     m_angular->root_share = root_share;
@@ -246,7 +249,7 @@ LowRankBasis KernelDecomposition::basis(const std::vector<std::size_t>& chosen, 
             for (std::size_t j = 0; j < medium.nodes.size(); ++j)
                 weights[k][rank][j][m] = by_node[index(j)];
             const Matrix& features = medium.features[m];
-            const NodeWeights& table = m_angular->tables.at(m_media[k].ldf);
+            const NodeWeights& table = m_angular->tables.at({m_media[k].ldf, m_media[k].side});
             values += table.interpolated(m, medium.nodes, features * (features.transpose() * by_node));
         }
         LowRankBasis::AngleFunction function{m, rank, {}};

@@ -37,7 +37,7 @@ public:
     RadialProfile profile(double angle_deg, double albedo, Side side) const override
     {
         const std::vector<RadialProfile> nodes = node_profiles(albedo, side);
-        const AngleWeights weights = angle_weights(angle_deg);
+        const AngleWeights weights = angle_weights(angle_deg, side);
         RadialProfile sum;
         for (std::size_t j = 0; j < nodes.size(); ++j)
             sum.add(nodes[j], weights.even[j], weights.odd[j]);
@@ -48,7 +48,10 @@ public:
     {
         return m_source.curved_node_profiles(albedo, side, m_curvature);
     }
-    AngleWeights angle_weights(double angle_deg) const override { return m_source.angle_weights(angle_deg); }
+    AngleWeights angle_weights(double angle_deg, Side side) const override
+    {
+        return m_source.angle_weights(angle_deg, side);
+    }
     void check_angle(double angle_deg) const override { m_source.check_angle(angle_deg); }
 
 private:
@@ -99,7 +102,7 @@ SurfaceBasis::SurfaceBasis(const std::vector<ChannelMedium>& channels, double ma
         curvatures.push_back(medium.ldf->curvatures());
         for (std::size_t k = 0; k < curvatures.back().size(); ++k) {
             sources.push_back(std::make_unique<OneCurvature>(*medium.ldf, k));
-            media.push_back({sources.back().get(), medium.albedo, medium.mean_free_path});
+            media.push_back({sources.back().get(), medium.albedo, medium.mean_free_path, medium.side});
         }
     }
     const Incidence incidence = incidence_up_to(max_angle_deg, 0.0);
