@@ -72,8 +72,9 @@ def draw_properties(node, layout) -> None:
     sides = node.sides()
     for side, name in ((FRONT, "image"), (BACK, "image_back")):
         if side in sides:
-            text = side.title() if len(sides) > 1 else ""
-            layout.template_ID(node, name, new="image.new", open="image.open", text=text)
+            # An empty text would still take half of the row.
+            label = {"text": side.title()} if len(sides) > 1 else {}
+            layout.template_ID(node, name, new="image.new", open="image.open", **label)
     _draw_map(node, layout)
     _draw_actions(node, layout)
 
