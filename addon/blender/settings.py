@@ -227,8 +227,8 @@ class BeamspreadSettings(bpy.types.PropertyGroup):
         description="Choose the frames of Bake Animation, instead of those of the scene or of its preview range",
         default=False,
     )
-    frame_first: IntProperty(name="First Frame", description="First frame of Bake Animation", default=1, min=0)
-    frame_last: IntProperty(name="Last", description="Last frame of Bake Animation", default=250, min=0)
+    frame_first: IntProperty(name="First Frame", description="Set the first frame of Bake Animation", default=1, min=0)
+    frame_last: IntProperty(name="Last", description="Set the last frame of Bake Animation", default=250, min=0)
     use_exposure: BoolProperty(
         name="Fit Exposure",
         description="Multiply the values of PNG files by the power of two that brings them to 1 or below. The file, "

@@ -24,6 +24,7 @@ class FilesOperator(RunOperator):
 
     objects: EnumProperty(
         name="Objects",
+        description="Choose the objects to bake",
         items=[
             ("SELECTED", "Selected", "Bake the selected objects. If none has a Beamspread node, bake all", 0),
             ("ALL", "All", "Bake all objects that have a Beamspread node", 1),
