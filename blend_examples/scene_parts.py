@@ -5,6 +5,7 @@ import math
 import bpy
 import numpy as np
 from mathutils import Matrix, Vector
+from ready import save_ready
 
 BEAMSPREAD_NODE = "BeamspreadNode"
 LATHE_STEPS = 48
@@ -29,11 +30,10 @@ def empty_scene(name, width, height, samples=64, view_transform="Standard", expo
 
 
 def save(path):
-    """Write a compressed .blend without a backup beside it."""
-    bpy.context.preferences.filepaths.save_version = 0
+    """Write a compressed .blend without a backup beside it, which opens ready to bake."""
     for _ in range(3):
         bpy.data.orphans_purge()
-    bpy.ops.wm.save_as_mainfile(filepath=path, compress=True, check_existing=False)
+    save_ready(path)
 
 
 def link(name, data):

@@ -22,7 +22,7 @@ PAGES = ("guide", "engines", "install", "python-and-batch", "performance", "meth
 """Pages in the order of the navigation."""
 
 # Pictures are read in a browser beside text: more pixels and less loss make the zip larger.
-MAX_WIDTH, QUALITY = 1100, 78
+MAX_WIDTH, QUALITY = 760, 55
 
 STYLE = """
 body { margin: 0 auto; max-width: 52em; padding: 1em 1.5em 4em; font: 16px/1.5 system-ui, sans-serif; }

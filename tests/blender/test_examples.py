@@ -69,3 +69,17 @@ def test_all_are_baked(name, tmp_path):
     assert report.bakes
     assert {bake.status for bake in report.bakes} == {"written"}
     assert not any(bake.dark or bake.left_out for bake in report.bakes)
+
+
+@pytest.mark.parametrize("name", KINDS)
+def test_all_open_ready_to_bake(name):
+    """Through the camera, with a quick preview, the objects of the bake selected, and the side bar with its panel."""
+    bpy.ops.wm.open_mainfile(filepath=str(FOLDER / f"{name}.blend"), load_ui=True)
+    (space,) = [area.spaces.active for area in bpy.data.screens["Layout"].areas if area.type == "VIEW_3D"]
+    assert (space.region_3d.view_perspective, space.shading.type) == ("CAMERA", "MATERIAL")
+    assert space.shading.use_scene_lights
+    assert space.shading.use_scene_world
+    assert space.show_region_ui
+    baked = {target.object_name for target in find_bakeable(bpy.context.view_layer)}
+    assert {obj.name for obj in bpy.context.selected_objects} == baked
+    assert bpy.context.view_layer.objects.active.name in baked
