@@ -4,10 +4,9 @@ from __future__ import annotations
 
 import bpy
 
-from ..images.image_operators import image_in
 from ..preferences import draw_help
 from ..registration import all_or_nothing, classes
-from .bake_panel import draw_bake, draw_lines
+from .bake_panel import draw_bake
 
 
 class BEAMSPREAD_PT_sidebar(bpy.types.Panel):
@@ -28,9 +27,6 @@ class BEAMSPREAD_PT_sidebar(bpy.types.Panel):
         column.prop(settings, "use_indirect")
         if not settings.use_size:
             column.prop(settings, "resolution")
-        image = image_in(context)
-        if image is not None:
-            draw_lines(layout, context, [image.name], "IMAGE_DATA")
 
 
 register, unregister = all_or_nothing(*classes(BEAMSPREAD_PT_sidebar))
