@@ -61,7 +61,9 @@ class BouncedLight(Step):
     finds_light = True
 
     def seconds(self, job: BakeJob) -> float:
-        return bounced_seconds(job.illumination.triangle_count, len(job.illumination.lights), job.settings.threads)
+        sides = len(job.lit_grids) // len(job.grids)
+        lights = len(job.illumination.lights)
+        return sides * bounced_seconds(job.illumination.triangle_count, lights, job.settings.threads)
 
     def run(self, job: BakeJob, progress: Progress) -> BakeJob:
         receiver, illumination, settings = job.receiver, job.illumination, job.settings

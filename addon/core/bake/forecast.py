@@ -20,6 +20,7 @@ from .estimate import (
     simulation_seconds,
     workloads_of,
 )
+from .layers import has_back
 from .pace import Estimate
 from .steps import Solve, needs_medium, to_simulate
 from .surface import Surface
@@ -79,7 +80,8 @@ class Forecast:
             lights = finders.world, finders.lamps, by_cycles
             steps.append((CYCLES_LIGHT, cycles_light_seconds(*lights, self.triangles)))
         if bounced and finders.is_own:
-            steps.append((BouncedLight.name, bounced_seconds(self.triangles, len(self.lights), threads)))
+            sides = 1 + has_back(self.surface.thickness, settings)
+            steps.append((BouncedLight.name, sides * bounced_seconds(self.triangles, len(self.lights), threads)))
         unknown = max(self.unknown, OF_WORLD * finders.world)
         loads = workloads_of(self.grids, self.lights, self.triangles, self.surface, settings, bounced, unknown)
         seconds = sum(replace(load, is_bent=self.is_bent).seconds(settings) for load in loads)
