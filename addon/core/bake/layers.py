@@ -15,6 +15,7 @@ from ..progress import Callback, Progress
 from ..scene.bent_grid import AnyGrid, BentGrid
 from ..scene.illumination import Illumination
 from .bake_settings import COMBINED, DIRECTION, IRRADIANCE, BakeSettings
+from .straight import straight_through
 from .surface import channel_media
 
 # Fraction of a bake's time that loading known libraries takes.
@@ -122,8 +123,7 @@ def spread(
 
 def has_back(thickness: float, settings: BakeSettings) -> bool:
     """True if light on the face behind a surface counts: in slabs whose LDF is known on both sides."""
-    is_known = settings.distributions == "library" and "side: str" in (native.bake_luminance.__doc__ or "")
-    return thickness > 0 and settings.layer == COMBINED and is_known
+    return thickness > 0 and settings.layer == COMBINED and settings.distributions == "library"
 
 
 def backs_of(grids: Sequence[AnyGrid]) -> list[AnyGrid]:
@@ -157,6 +157,11 @@ def spread_side(
         of_group = _spread_group(side, group, *rest, count, part, bytes_for_light, seed, report_noise, report_bend)
         for number, luminance in zip(numbers, of_group):
             luminances[number] = luminance
+    for number, grid in enumerate(grids):
+        if side == "transmitted" and isinstance(grid, BentGrid):
+            all_rays = min(RAYS_PER_SAMPLE * settings.samples**2, MAX_RAYS_BY_SAMPLES)
+            straight = straight_through(grid, illumination, sources, settings.samples, all_rays, settings.threads)
+            luminances[number] = luminances[number] + straight
     return luminances
 
 

@@ -31,30 +31,28 @@ class KernelCache:
         self._exactness: dict = {}  # by media: index of the entry that has few terms
         self.made = 0
 
-    def field(self, grid: Grid, medium: dict, is_colored: bool, side: str = "reflected"):
+    def field(self, grid: Grid, medium: dict, is_colored: bool):
         """The field of a medium on a grid.
 
         Parameters
         ----------
         medium : arguments ldf, albedo and mean_free_path of `convolve`, and threads.
         is_colored : True if lights may differ in color.
-        side : "reflected"; or "transmitted" for light that leaves at the other face.
         """
         pitch, shape = (grid.pitch_x, grid.pitch_y), (grid.height, grid.width)
         values = tuple(map(float, (*medium["albedo"], *medium["mean_free_path"], *pitch)))
-        key = (*map(id, medium["ldf"]), *values, *shape, is_colored, side)
+        key = (*map(id, medium["ldf"]), *values, *shape, is_colored)
         if key in self._fields:
             field, _ = self._fields[key]
         else:
-            sided = {} if side == "reflected" else {"side": side}
-            field = self._make(shape, medium | {"pitch": pitch} | sided, is_colored)
+            field = self._make(shape, medium | {"pitch": pitch}, is_colored)
             self.made += 1
         # The entry holds the libraries, so that no other library gets the same id.
         return keep_recent(self._fields, key, (field, medium["ldf"]), MAX_FIELDS)[0]
 
     def _make(self, shape: tuple[int, int], medium: dict, is_colored: bool):
-        media = (medium.get("side"), *((ldf.medium.g, ldf.medium.ior, ldf.medium.thickness) for ldf in medium["ldf"]))
-        is_thin = any(thickness < THIN and ior > 1 for _, ior, thickness in media[1:])
+        media = tuple((ldf.medium.g, ldf.medium.ior, ldf.medium.thickness) for ldf in medium["ldf"])
+        is_thin = any(thickness < THIN and ior > 1 for _, ior, thickness in media)
         first = len(EXACTNESS) - 1 if is_thin else 0
         for choice in range(self._exactness.get(media, first), len(EXACTNESS)):
             max_angle, tolerance = EXACTNESS[choice]

@@ -11,7 +11,7 @@ from ..bake.bake_settings import COMBINED, BakeSettings
 from ..bake.bent_limits import bent_messages
 from ..bake.edges import with_edges
 from ..bake.finish import finished_texture, with_seams
-from ..bake.layers import backs_of, has_back, spread, spread_side
+from ..bake.layers import has_back, spread
 from ..bake.surface import channel_media
 from ..errors import BakeError
 from ..ldf.albedo import albedo_from_reflectance
@@ -107,8 +107,9 @@ class LiveRenderer:
         return target.size or texture_size(self._mesh(target), target.resolution)
 
     def quick_side(self, target: LiveTarget) -> int:
-        """Texels along the longer side of a quick rendering of the target; few where it bends, which takes longer."""
-        return SIDES[0] if self._mesh(target).is_bent else quick_side(target.illumination.lights)
+        """Texels along the longer side of a quick rendering of the target; few where that takes longer."""
+        is_slow = self._mesh(target).is_bent or has_back(target.surface.thickness, target.settings)
+        return SIDES[0] if is_slow else quick_side(target.illumination.lights)
 
     def quick(self, target: LiveTarget, side: int, progress: Progress | None = None) -> Rendering:
         """Render at most `side` texels along the longer side, interpolated to the size of the image.
@@ -202,15 +203,12 @@ class LiveRenderer:
         is_slab = has_back(target.surface.thickness, settings)
         grids = [replace(chart.grid, color_out=None) for chart in framed.receiver.charts]
         sizes = {(grid.width, grid.height, grid.pitch_x, grid.pitch_y) for grid in grids}
-        # The cache has kernels of few sizes, and of planes.
-        if len(grids) > MAX_GRIDS_APART or len(sizes) > MAX_FIELDS or framed.receiver.is_bent:
+        # The cache has kernels of few sizes, and of planes with light on one face.
+        if len(grids) > MAX_GRIDS_APART or len(sizes) > MAX_FIELDS or framed.receiver.is_bent or is_slab:
             rays = QUICK_RAYS * max(len(illumination.lights), 1)
             values = spread(grids, illumination, *rest, rays=rays, is_slab=is_slab)
         else:
             values = [self._quick_luminance(grid, illumination, *rest) for grid in grids]
-            if is_slab:
-                backs = [self._quick_luminance(back, illumination, *rest, "transmitted") for back in backs_of(grids)]
-                values = [value + through for value, through in zip(values, backs)]
         return framed.continued(framed.receiver.to_texture(values))
 
     def _together(self, target: LiveTarget) -> Rendering:
@@ -234,14 +232,12 @@ class LiveRenderer:
         sources: list,
         settings: BakeSettings,
         progress,
-        side: str = "reflected",
     ) -> np.ndarray:
-        """Luminance by light on the grid's own side (reflected), or of the other face (transmitted)."""
         lights = [light for light in illumination.lights if not light.is_behind(grid)]
         if not lights:
             return np.zeros((grid.height, grid.width, 3), np.float32)
         if _are_few_suns(lights, grid) or settings.distributions != "library":
-            return spread_side(side, [grid], illumination, material, sources, settings, progress)[0]
+            return spread([grid], illumination, material, sources, settings, progress)[0]
         medium = {
             "ldf": sources,
             "albedo": material.albedo,
@@ -249,7 +245,7 @@ class LiveRenderer:
             "threads": settings.threads,
         }
         color = _common_color(grid, illumination)
-        field = self.kernels.field(grid, medium, is_colored=color is None, side=side)
+        field = self.kernels.field(grid, medium, is_colored=color is None)
         arriving = illumination.native_lights(grid)
         if color is not None:
             arriving = [(light, [max(rgb)] * 3, caster) for light, rgb, caster in arriving]
