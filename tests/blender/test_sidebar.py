@@ -1,0 +1,36 @@
+"""The panel in the 3D View's side bar is drawn, with the state of objects."""
+
+from types import SimpleNamespace
+
+import panel_layout
+import pytest
+from beamspread.blender.ui.sidebar import BEAMSPREAD_PT_sidebar
+from scenes import add_material, add_plane, add_sun, bake, select
+
+
+class Layout(panel_layout.Layout):
+    """Takes properties as well."""
+
+    def __init__(self):
+        super().__init__()
+        self.properties = []
+
+    def prop(self, _data, name, **_options):
+        self.properties.append(name)
+
+
+@pytest.mark.parametrize("use_size", [True, False])
+def test_it_has_live_the_state_and_the_settings_of_each_bake(use_size):
+    add_sun(0)
+    plane = add_plane(material=add_material())
+    select(plane)
+    context = panel_layout.context()
+    context.scene.beamspread.resolution = 16
+    bake(plane)
+    panel_layout.panel()  # the state is up to date
+    context.scene.beamspread.use_size = use_size
+    layout = Layout()
+    BEAMSPREAD_PT_sidebar.draw(SimpleNamespace(layout=layout), context)
+    assert "Plane: Baked" in layout.said
+    assert ("resolution" in layout.properties) != use_size
+    assert {"use_live", "use_indirect"} <= set(layout.properties)
