@@ -189,6 +189,20 @@ def redraw(context, *area_types: str) -> None:
                 area.tag_redraw()
 
 
+def restart_views(context) -> None:
+    """Have views of EEVEE start their picture again, since they don't see that pixels of an image changed.
+
+    The picture is the mean of some frames: those with former pixels would stay in it as a ghost. Cycles starts again
+    with a new image.
+    """
+    for window in context.window_manager.windows:
+        is_cycles = window.scene.render.engine == "CYCLES"
+        for area in window.screen.areas:
+            shading = area.spaces.active.shading if area.type == "VIEW_3D" else None
+            if shading is not None and (shading.type == "MATERIAL" or (shading.type == "RENDERED" and not is_cycles)):
+                shading.type = str(shading.type)  # an equal value starts it again, too
+
+
 @persistent
 def _forget(*_arguments) -> None:
     state.forget()

@@ -14,7 +14,7 @@ from ...core.target import BACK, Target
 from ..images import files, icons
 from ..node.find import find_node
 from ..node.node import all_nodes, image_of_side, own_tree
-from ..node.tree import IMAGE, restart_views, show_images, show_map_for_now, show_own_images_in, shown_images
+from ..node.tree import IMAGE, show_images, show_map_for_now, show_own_images_in, shown_images
 
 NAME = ".Beamspread Live"  # the dot hides it in menus
 
@@ -100,8 +100,6 @@ class Preview:
                 front, back = image, back or image
             show_images(tree, front, back)
             self.tree_name = tree.name
-        if not is_filled:
-            restart_views(node.node_tree)
         show_map_for_now(node.node_tree, self._uv_map)
 
     def renew(self) -> None:

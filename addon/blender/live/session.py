@@ -13,7 +13,7 @@ from ...core.messages import Level, Message, Messages, note
 from ...core.target import Target
 from ..cycles.sky import SkyService
 from ..images.facts import ImageFacts, facts_of, owners_of
-from ..jobs.state import redraw, state
+from ..jobs.state import redraw, restart_views, state
 from ..node.find import find_node
 from ..node.node import image_of_side
 from ..read.scene_cache import scene_cache
@@ -260,6 +260,7 @@ class Session:
                 self._notes[target] = rendering.messages
                 shown |= self._show(rendering)
         if renderings:
+            restart_views(context)
             redraw(context, "VIEW_3D")
         return shown
 

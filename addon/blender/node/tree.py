@@ -196,16 +196,6 @@ def _add_back(tree) -> None:
         link(reader, side.outputs[0])
 
 
-def restart_views(tree) -> None:
-    """Have views that show the tree start their picture again, since they don't see that pixels of its image changed.
-
-    EEVEE's picture is the mean of some frames: those with former pixels would stay in it as a ghost.
-    """
-    if BAKED in tree.nodes:
-        value = tree.nodes[BAKED].outputs[0]
-        value.default_value = float(value.default_value)  # an equal value tells the views, too
-
-
 def show_map(tree, name: str) -> None:
     """Show the image by the UV map of that name; "" is the one that renders."""
     node = tree.nodes.get(UV_MAP)
