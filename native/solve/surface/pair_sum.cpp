@@ -78,12 +78,16 @@ constexpr float steep = 0.5f;
 #endif
 }
 
+// Distance of a curvature from a node, over that of two nodes, below which it counts as at the node: on planes rounding
+// alone moves it. Larger: less time where a surface hardly bends, larger errors.
+constexpr float least_part = 1e-4f;
+
 // Rows of a table around a chord and a curvature, and their weights.
 struct Rows {
     std::size_t first;  // index of the value of the lower chord and curvature
     std::size_t to_next;  // to that of the next chord
     std::size_t to_high;  // to that of the next curvature
-    std::array<float, 4> weight;
+    std::array<float, 4> weight;  // 0 for the next curvature at a node
 };
 
 template <std::size_t results, bool are_clusters>
@@ -91,17 +95,20 @@ void add_pairs_of(const PairTables& tables, const PairTarget& target, std::span<
                   const float* moments, std::size_t stride, float* sums, float& beyond)
 {
     // Value at the place of some rows in a table.
-    const auto interpolate = [](const Rows& rows, const float* values, Lanes& value) __attribute__((always_inline)) {
-        const float* first = values + rows.first;
-        const float* high = first + rows.to_high;
-        std::array<Lanes, 4> row;
-        load(first, row[0]);
-        load(first + rows.to_next, row[1]);
-        load(high, row[2]);
-        load(high + rows.to_next, row[3]);
-        value =
-            (row[0] * rows.weight[0] + row[1] * rows.weight[1]) + (row[2] * rows.weight[2] + row[3] * rows.weight[3]);
-    };
+    const auto interpolate = [](const Rows& rows, bool at_node, const float* values, Lanes& value)
+                                 __attribute__((always_inline)) {
+                                     const float* first = values + rows.first;
+                                     std::array<Lanes, 2> row;
+                                     load(first, row[0]);
+                                     load(first + rows.to_next, row[1]);
+                                     value = row[0] * rows.weight[0] + row[1] * rows.weight[1];
+                                     if (at_node)
+                                         return;
+                                     const float* high = first + rows.to_high;
+                                     load(high, row[0]);
+                                     load(high + rows.to_next, row[1]);
+                                     value = value + (row[0] * rows.weight[2] + row[1] * rows.weight[3]);
+                                 };
     std::array<Lanes, results> all{};
     Lanes clamped{};
     const std::size_t lanes = tables.blocks * lanes_per_block;
@@ -111,10 +118,10 @@ void add_pairs_of(const PairTables& tables, const PairTarget& target, std::span<
         float chord = std::sqrt(square);
         if (chord >= tables.reach)
             continue;
-        const bool is_disk = !are_clusters && chord < tables.disk_end[source.disk];
+        const bool is_disk = !are_clusters && chord < tables.disks[source.disk]->end;
         if (is_disk)
-            chord = std::max(chord, tables.disk_begin[source.disk]);
-        const ChordTable& table = is_disk ? tables.disks[source.disk] : tables.point;
+            chord = std::max(chord, tables.disks[source.disk]->begin);
+        const ChordTable& table = is_disk ? tables.disks[source.disk]->light : tables.point->light;
         const std::uint32_t step = std::clamp(chord_step(chord), table.first, table.first + table.rows - 2);
         const float before = chord_of(step);
         const float part = std::clamp((chord - before) / (chord_of(step + 1) - before), 0.0f, 1.0f);
@@ -124,13 +131,21 @@ void add_pairs_of(const PairTables& tables, const PairTarget& target, std::span<
                                 per_square;
         std::array<Rows, results> rows;
         bool is_beyond = false;
+        bool at_node = true;
         for (std::size_t r = 0; r < results; ++r) {
             const CurvatureScale& scale = tables.scales[r];
             const float inside = std::clamp(curvature, scale.nodes.front(), scale.nodes.back());
-            const std::size_t k = scale.per_step > 0.0f ? scale.interval_of(inside) : 0;
-            const std::size_t next = scale.per_step > 0.0f ? k + 1 : 0;
-            const float to_next =
+            std::size_t k = scale.per_step > 0.0f ? scale.interval_of(inside) : 0;
+            float to_next =
                 scale.per_step > 0.0f ? (inside - scale.nodes[k]) / (scale.nodes[k + 1] - scale.nodes[k]) : 0.0f;
+            if (std::abs(to_next - 1.0f) < least_part) {
+                ++k;
+                to_next = 0.0f;
+            } else if (std::abs(to_next) < least_part) {
+                to_next = 0.0f;
+            }
+            at_node = at_node && to_next == 0.0f;
+            const std::size_t next = to_next != 0.0f ? k + 1 : k;
             if (r == 0)
                 is_beyond = inside != curvature;
             const std::size_t row = k * table.rows + step - table.first;
@@ -153,7 +168,7 @@ void add_pairs_of(const PairTables& tables, const PairTarget& target, std::span<
         const float weight = source.area * per_square;
         real *= weight;
         imaginary *= weight;
-        const std::size_t blocks = is_disk ? tables.blocks : tables.point_blocks[step - table.first];
+        const std::size_t blocks = is_disk ? tables.blocks : tables.point->blocks[step - table.first];
         for (std::size_t b = 0; b < blocks; ++b) {
             Lanes cosines, sines;
             spread(real, tables.harmonic.data() + b * lanes_per_block, cosines);
@@ -169,10 +184,10 @@ void add_pairs_of(const PairTables& tables, const PairTarget& target, std::span<
                 }
                 const std::size_t at = b * lanes_per_block;
                 Lanes value;
-                interpolate(rows[r], table.values[r].data() + at, value);
+                interpolate(rows[r], at_node, table.values[r].data() + at, value);
                 if constexpr (are_clusters) {
                     Lanes second;
-                    interpolate(rows[r], tables.laplacian.values[r].data() + at, second);
+                    interpolate(rows[r], at_node, tables.point->laplacian.values[r].data() + at, second);
                     value += second * (source.spread * per_square);
                 }
                 const Lanes product = light * value;

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <iomanip>
+#include <optional>
 #include <sstream>
 #include <utility>
 
@@ -95,22 +96,22 @@ SampleAreas areas_of(std::span<const SurfaceSample> samples)
     return {least->area, most->area, static_cast<float>(sum / static_cast<double>(samples.size()))};
 }
 
-SurfaceBasis checked_basis(const SurfaceProblem& problem)
+std::shared_ptr<SurfaceKernels> checked_kernels(const SurfaceProblem& problem)
 {
-    std::optional<SurfaceBasis> basis;
+    std::shared_ptr<SurfaceKernels> kernels;
     with_threads(problem.threads, [&] {
         check(problem);
-        basis.emplace(problem.channels, problem.max_angle_deg,
-                      std::sqrt(static_cast<double>(areas_of(problem.samples).mean)), problem.is_colored,
-                      problem.tolerance);
+        kernels = SurfaceKernels::recent({problem.channels, problem.max_angle_deg,
+                                          std::sqrt(static_cast<double>(areas_of(problem.samples).mean)),
+                                          problem.is_colored, problem.tolerance});
     });
-    return *std::move(basis);
+    return kernels;
 }
 
-PairTables tables_of(const SurfaceProblem& problem, const SurfaceBasis& basis)
+PairTables tables_of(const SurfaceProblem& problem, SurfaceKernels& kernels)
 {
     std::optional<PairTables> tables;
-    with_threads(problem.threads, [&] { tables.emplace(basis, areas_of(problem.samples), problem.tolerance); });
+    with_threads(problem.threads, [&] { tables.emplace(kernels, areas_of(problem.samples)); });
     return *std::move(tables);
 }
 
@@ -118,8 +119,9 @@ PairTables tables_of(const SurfaceProblem& problem, const SurfaceBasis& basis)
 
 SurfaceField::SurfaceField(const SurfaceProblem& problem, Progress& progress)
     : m_problem(problem),
-      m_basis(checked_basis(problem)),
-      m_tables(tables_of(problem, m_basis)),
+      m_kernels(checked_kernels(problem)),
+      m_basis(m_kernels->basis()),
+      m_tables(tables_of(problem, *m_kernels)),
       m_tree(problem.samples)
 {
     const std::size_t moments = problem.samples.size() + m_tree.nodes();
@@ -242,7 +244,7 @@ SurfaceTree::Opening SurfaceField::find_opening()
                 largest[i][r] = std::max(largest[i][r], exitance.sums[r]);
         });
     });
-    std::vector<double> bound(m_tables.point.rows);
+    std::vector<double> bound(m_tables.point->light.rows);
     for (std::size_t r = 0; r < m_tables.results; ++r) {
         float most = 0.0f;
         for (const auto& exitance : largest)
@@ -254,7 +256,7 @@ SurfaceTree::Opening SurfaceField::find_opening()
         for (std::size_t row = 0; row < bound.size(); ++row)
             bound[row] = std::max(bound[row], bends[row] / (scale * static_cast<double>(most)));
     }
-    SurfaceTree::Opening opening{0.0f, m_tables.point.first, {}};
+    SurfaceTree::Opening opening{0.0f, m_tables.point->light.first, {}};
     for (const double value : bound)
         opening.bound.push_back(static_cast<float>(value / (error_share * m_problem.tolerance)));
     return opening;

@@ -5,8 +5,8 @@
 #include <array>
 #include <cstddef>
 #include <functional>
+#include <memory>
 #include <mutex>
-#include <optional>
 #include <span>
 #include <vector>
 
@@ -17,6 +17,7 @@
 #include "solve/surface/pair_sum.h"
 #include "solve/surface/pair_tables.h"
 #include "solve/surface/surface_basis.h"
+#include "solve/surface/surface_kernels.h"
 #include "solve/surface/surface_tree.h"
 
 namespace beamspread {
@@ -83,7 +84,8 @@ private:
     void set_color(const std::vector<double>& color);
 
     SurfaceProblem m_problem;
-    SurfaceBasis m_basis;
+    std::shared_ptr<SurfaceKernels> m_kernels;
+    const SurfaceBasis& m_basis;
     PairTables m_tables;
     SurfaceTree m_tree;
     std::vector<float> m_moments;  // [sample], then [node of the tree], as in `SurfaceBasis`

@@ -1,0 +1,262 @@
+#include "solve/surface/chord_table.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <optional>
+
+#include "base/constants.h"
+
+namespace beamspread {
+
+namespace {
+
+// Chord from which a disk counts as a point, and first chord of its table, in radii. Larger end: smaller errors, more
+// time.
+constexpr float disk_end_radii = 8.0f;
+constexpr float disk_first_radii = 1.0f;
+
+// Least chord of another sample, in radii: it lies outside of the disk. Texels at the rims of UV islands are cut, and their
+// middles lie within the disks of their neighbors.
+constexpr float disk_begin_radii = 1.125f;
+
+// Fraction of the tolerance that functions may have where they are left out. Larger: less time for light far away.
+constexpr double block_share = 0.5;
+
+// Least chord, in radii of a disk, at which curvatures are compared: both profiles are infinite at the pole.
+constexpr double least_chord = 0.1;
+
+// Step of the chord, relative, for derivatives. Smaller: the profiles' bins and their noise show; larger: less exact.
+constexpr double derivative_step = 0.15;
+
+// Rings of a disk and points on half of each, at which curvatures are compared. More: smaller errors, more time.
+constexpr std::size_t compared_rings = 4;
+constexpr std::size_t compared_azimuths = 6;
+
+// Points of equal area of a disk around the end of a chord, on one side of the chord: the other is its mirror image.
+struct DiskPoints {
+    static constexpr std::size_t count = compared_rings * compared_azimuths;
+    std::array<double, count> chord;  // in the unit of the radius
+    std::array<std::array<double, surface_harmonics>, count> cosines;  // of m times the azimuth
+
+    DiskPoints(double c, double radius)
+    {
+        for (std::size_t p = 0; p < count; ++p) {
+            const double ring = radius * std::sqrt((static_cast<double>(p / compared_azimuths) + 0.5) /
+                                                   static_cast<double>(compared_rings));
+            const double turn =
+                pi * (static_cast<double>(p % compared_azimuths) + 0.5) / static_cast<double>(compared_azimuths);
+            const double x = c + ring * std::cos(turn);
+            const double y = ring * std::sin(turn);
+            const double azimuth = std::atan2(y, x);
+            chord[p] = std::max(std::hypot(x, y), least_chord * radius);
+            for (std::size_t m = 0; m < surface_harmonics; ++m)
+                cosines[p][m] = std::cos(static_cast<double>(m) * azimuth);
+        }
+    }
+
+    // Mean of a profile, whose mean free path is in the unit of the radius.
+    Harmonics mean(const ScaledProfile& scaled) const
+    {
+        Harmonics sums{};
+        for (std::size_t p = 0; p < count; ++p) {
+            const Harmonics density = scaled.profile.density(chord[p] / scaled.mean_free_path);
+            for (std::size_t m = 0; m < surface_harmonics; ++m)
+                sums[m] += density[m] * cosines[p][m];
+        }
+        for (std::size_t m = 0; m < surface_harmonics; ++m)
+            sums[m] /= static_cast<double>(count);
+        return sums;
+    }
+};
+
+void choose_blocks(const SurfaceBasis& basis, double tolerance, PointTable& table)
+{
+    const std::size_t blocks = basis.blocks;
+    const std::size_t lanes = basis.functions();
+    const ChordTable& point = table.light;
+    table.blocks.assign(point.rows, 0);
+    for (std::size_t r = 0; r < point.values.size(); ++r) {
+        // Power beyond a chord of each block and those after it; the light is at its most in each function.
+        std::vector<double> beyond(blocks);
+        double all = 0.0;
+        for (const bool is_known : {false, true})
+            for (std::size_t row = point.rows; row-- > 0;) {
+                std::vector<double> power(blocks);
+                for (std::size_t lane = 0; lane < basis.largest.size(); ++lane) {
+                    float value = 0.0f;
+                    for (std::size_t k = 0; k < curvature_count(basis, r); ++k)
+                        value = std::max(value, std::abs(point.values[r][(k * point.rows + row) * lanes + lane]));
+                    for (std::size_t b = 0; b <= lane / lanes_per_block; ++b)
+                        power[b] += static_cast<double>(value * basis.largest[lane]);
+                }
+                const float chord = chord_of(point.first + static_cast<std::uint32_t>(row));
+                const float next = chord_of(point.first + static_cast<std::uint32_t>(row + 1));
+                const double octave = std::log(static_cast<double>(next / chord));
+                if (!is_known) {
+                    all += octave * power[0];
+                    continue;
+                }
+                for (std::size_t b = 0; b < blocks; ++b) {
+                    beyond[b] += octave * power[b];
+                    if (beyond[b] > block_share * tolerance * all)
+                        table.blocks[row] = std::max(table.blocks[row], static_cast<std::uint8_t>(b + 1));
+                }
+            }
+    }
+}
+
+void make_laplacian(const SurfaceBasis& basis, PointTable& table)
+{
+    const ChordTable& point = table.light;
+    ChordTable& laplacian = table.laplacian;
+    laplacian.first = point.first;
+    laplacian.rows = point.rows;
+    const std::size_t lanes = basis.functions();
+    for (std::size_t r = 0; r < point.values.size(); ++r) {
+        const std::size_t nodes = curvature_count(basis, r);
+        AlignedVector<float>& values = laplacian.values.emplace_back(point.values[r].size(), 0.0f);
+        parallel_for(nodes * point.rows, [&](std::size_t item) {
+            const std::size_t curvature = item / point.rows;
+            const std::size_t row = item % point.rows;
+            const auto c = static_cast<double>(chord_of(point.first + static_cast<std::uint32_t>(row)));
+            const std::vector<ScaledProfile>& profiles = profiles_of(basis, r, curvature);
+            for (std::size_t rank = 0; rank < profiles.size(); ++rank) {
+                const double in_paths = c / profiles[rank].mean_free_path;
+                const auto at = [&](double ratio) { return profiles[rank].profile.density(in_paths * ratio); };
+                if (c * (1.0 + derivative_step) > profiles[rank].reach)
+                    continue;
+                const Harmonics before = at(1.0 - derivative_step);
+                const Harmonics here = at(1.0);
+                const Harmonics after = at(1.0 + derivative_step);
+                for (std::size_t lane = 0; lane < basis.rank.size(); ++lane) {
+                    if (basis.rank[lane] != rank)
+                        continue;
+                    const auto m = static_cast<std::size_t>(basis.harmonic[lane]);
+                    const double second = (before[m] - 2.0 * here[m] + after[m]) / (derivative_step * derivative_step);
+                    const double first = (after[m] - before[m]) / (2.0 * derivative_step);
+                    values[item * lanes + lane] = static_cast<float>(
+                        (second + first - static_cast<double>(m * m) * here[m]) * in_paths * in_paths);
+                }
+            }
+        });
+    }
+}
+
+}  // namespace
+
+const std::vector<ScaledProfile>& profiles_of(const SurfaceBasis& basis, std::size_t result, std::size_t curvature)
+{
+    const std::size_t medium = basis.terms.sets.results[result].medium;
+    return basis.terms.basis.profiles[basis.first_profiles[medium] + curvature];
+}
+
+std::size_t flat_index(const SurfaceBasis& basis, std::size_t result)
+{
+    const std::vector<double>& nodes = basis.curvatures[basis.terms.sets.results[result].medium];
+    return static_cast<std::size_t>(std::find(nodes.begin(), nodes.end(), 0.0) - nodes.begin());
+}
+
+std::size_t curvature_count(const SurfaceBasis& basis, std::size_t result)
+{
+    return basis.curvatures[basis.terms.sets.results[result].medium].size();
+}
+
+void fill_chord_table(const SurfaceBasis& basis, ChordTable& table, float radius, float end)
+{
+    table.rows = std::max(chord_step(end), table.first) - table.first + 2;
+    struct Item {
+        std::size_t result, rank;
+    };
+    std::vector<Item> items;
+    const std::size_t lanes = basis.functions();
+    for (std::size_t r = 0; r < basis.terms.sets.results.size(); ++r) {
+        table.values.emplace_back(curvature_count(basis, r) * table.rows * lanes, 0.0f);
+        for (std::size_t rank = 0; rank < profiles_of(basis, r, 0).size(); ++rank)
+            items.push_back({r, rank});
+    }
+    const auto chord_at = [&](std::size_t row) {
+        return static_cast<double>(chord_of(table.first + static_cast<std::uint32_t>(row)));
+    };
+    const auto reaches = [&](const ScaledProfile& scaled, double chord) {
+        return chord <= scaled.reach + static_cast<double>(radius);
+    };
+    // Writes the functions of an item at a row, of c^2 times those in `at_chord`, c in mean free paths.
+    const auto write = [&](const Item& item, std::size_t curvature, std::size_t row, const Harmonics& at_chord) {
+        const double c = chord_at(row) / profiles_of(basis, item.result, curvature)[item.rank].mean_free_path;
+        float* values = table.values[item.result].data() + (curvature * table.rows + row) * lanes;
+        for (std::size_t lane = 0; lane < basis.rank.size(); ++lane)
+            if (basis.rank[lane] == item.rank)
+                values[lane] = static_cast<float>(at_chord[static_cast<std::size_t>(basis.harmonic[lane])] * c * c);
+    };
+    if (radius == 0.0f) {
+        parallel_for(items.size(), [&](std::size_t i) {
+            for (std::size_t k = 0; k < curvature_count(basis, items[i].result); ++k) {
+                const ScaledProfile& scaled = profiles_of(basis, items[i].result, k)[items[i].rank];
+                for (std::size_t row = 0; row < table.rows && reaches(scaled, chord_at(row)); ++row)
+                    write(items[i], k, row, scaled.profile.density(chord_at(row) / scaled.mean_free_path));
+            }
+        });
+        return;
+    }
+    // Means over a disk take long. Curvature changes profiles by functions that are smooth at the pole: few points are
+    // enough for the mean of the change.
+    parallel_for(items.size() * table.rows, [&](std::size_t number) {
+        const Item& item = items[number / table.rows];
+        const std::size_t row = number % table.rows;
+        const std::size_t plane = flat_index(basis, item.result);
+        const ScaledProfile& flat = profiles_of(basis, item.result, plane)[item.rank];
+        const double chord = chord_at(row);
+        Harmonics of_plane{};
+        if (reaches(flat, chord)) {
+            const double path = flat.mean_free_path;
+            of_plane = disk_mean(flat.profile, static_cast<double>(radius) / path, chord / path);
+            write(item, plane, row, of_plane);
+        }
+        std::optional<DiskPoints> points;
+        Harmonics of_points{};
+        for (std::size_t k = 0; k < curvature_count(basis, item.result); ++k) {
+            const ScaledProfile& scaled = profiles_of(basis, item.result, k)[item.rank];
+            if (k == plane || !reaches(scaled, chord))
+                continue;
+            if (!points) {
+                points.emplace(chord, static_cast<double>(radius));
+                of_points = points->mean(flat);
+            }
+            Harmonics mean = points->mean(scaled);
+            for (std::size_t m = 0; m < surface_harmonics; ++m)
+                mean[m] += of_plane[m] - of_points[m];
+            write(item, k, row, mean);
+        }
+    });
+}
+
+DiskTable make_disk(const SurfaceBasis& basis, float radius, float reach)
+{
+    DiskTable disk{radius, disk_begin_radii * radius, disk_end_radii * radius, {}, {}};
+    disk.light.first = chord_step(disk_first_radii * radius);
+    fill_chord_table(basis, disk.light, radius, std::min(disk.end, reach));
+    const std::size_t results = disk.light.values.size();
+    disk.excess.assign(results, std::vector<double>(basis.rank.size()));
+    parallel_for(results * basis.rank.size(), [&](std::size_t item) {
+        const std::size_t r = item / basis.rank.size();
+        const std::size_t lane = item % basis.rank.size();
+        if (basis.harmonic[lane] != 0)
+            return;
+        const ScaledProfile& scaled = profiles_of(basis, r, flat_index(basis, r))[basis.rank[lane]];
+        disk.excess[r][lane] = grid_excess(scaled.profile, static_cast<double>(radius) / scaled.mean_free_path);
+    });
+    return disk;
+}
+
+PointTable make_point(const SurfaceBasis& basis, float first, float reach, double tolerance)
+{
+    PointTable point;
+    point.light.first = chord_step(first);
+    fill_chord_table(basis, point.light, 0.0f, reach);
+    choose_blocks(basis, tolerance, point);
+    make_laplacian(basis, point);
+    return point;
+}
+
+}  // namespace beamspread

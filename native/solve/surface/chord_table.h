@@ -1,0 +1,79 @@
+// Tables over the chord of the light that a surface returns around a sample.
+#pragma once
+
+#include <bit>
+#include <cstddef>
+#include <cstdint>
+#include <vector>
+
+#include "base/threads.h"
+#include "solve/surface/surface_basis.h"
+
+namespace beamspread {
+
+// Tables over the chord have 2^chord_bits steps per octave and are linear in between. More: smaller errors, more memory.
+inline constexpr int chord_bits = 4;
+inline constexpr int within_chord_bits = 23 - chord_bits;
+
+inline std::uint32_t chord_step(float chord)
+{
+    return std::bit_cast<std::uint32_t>(chord) >> within_chord_bits;
+}
+
+// First chord of a step, metres.
+inline float chord_of(std::uint32_t step)
+{
+    return std::bit_cast<float>(step << within_chord_bits);
+}
+
+// Values e(c, k) c^2 without unit, for light that comes from a point or a disk. They change slowly with the chord c.
+struct ChordTable {
+    std::uint32_t first = 0;                   // step of the first row
+    std::uint32_t rows = 0;                    // at least 2
+    std::vector<AlignedVector<float>> values;  // [result], [curvature][row][block][lane]
+
+    std::size_t bytes() const
+    {
+        std::size_t sum = 0;
+        for (const AlignedVector<float>& of_result : values)
+            sum += of_result.size() * sizeof(float);
+        return sum;
+    }
+};
+
+// Light of a disk, which stands for a sample.
+struct DiskTable {
+    float radius = 0.0f;  // metres
+    float begin = 0.0f;   // least chord of other samples, metres: samples do not overlap, disks may
+    float end = 0.0f;     // chord from which its light counts as a point's, metres
+    ChordTable light;
+    std::vector<std::vector<double>> excess;  // [result][lane]: see `grid_excess`; of m = 0
+};
+
+// Light of a point.
+struct PointTable {
+    ChordTable light;
+    ChordTable laplacian;  // c^4 times e'' + e' / c - m^2 e / c^2, with the rows of `light`
+    std::vector<std::uint8_t> blocks;  // [row] blocks that matter from this chord on
+};
+
+// Functions of a result on a surface of a curvature, [rank].
+const std::vector<ScaledProfile>& profiles_of(const SurfaceBasis& basis, std::size_t result, std::size_t curvature);
+
+// Number of curvatures of a result, and which of them is that of a plane.
+std::size_t curvature_count(const SurfaceBasis& basis, std::size_t result);
+std::size_t flat_index(const SurfaceBasis& basis, std::size_t result);
+
+// Fills a table of a disk (radius 0: a point) up to a chord.
+void fill_chord_table(const SurfaceBasis& basis, ChordTable& table, float radius, float end);
+
+// Excess of the light of evenly lit disks on a square grid over that of an even plane, per irradiance. It is not 0 where
+// the medium spreads about as far as the grid's pitch (Poisson's sum formula).
+double grid_excess(const RadialProfile& profile, double radius);
+
+// The table of a disk; light from beyond `reach` counts as none. And of a point, from a chord on; functions are left out
+// where they have less than the tolerance of the power.
+DiskTable make_disk(const SurfaceBasis& basis, float radius, float reach);
+PointTable make_point(const SurfaceBasis& basis, float first, float reach, double tolerance);
+
+}  // namespace beamspread
