@@ -308,3 +308,14 @@ def test_threads_take_turns():
             thread.join()
     assert len(results) == 3
     assert not folders(os.getpid())[1:]
+
+
+def test_a_world_s_progress_follows_the_samples_of_cycles():
+    """So that the time left is that at its speed, also on a busy machine."""
+    scenes.add_world()
+    told = []
+    with new_copy() as copy:
+        process.run(copy, "world", SHORT | {"width": 512, "height": 256, "samples": 2000}, told.append)
+    between = sorted({round(fraction, 3) for fraction in told if 0 < fraction < 0.7})
+    assert len(between) >= 3, told
+    assert told == sorted(told)

@@ -11,7 +11,6 @@ import importlib
 import json
 import os
 import queue
-import re
 import shutil
 import signal
 import sys
@@ -51,9 +50,6 @@ FAILED, IDLE = 1, 4
 # Seconds until a process whose parent was killed has another parent, at most.
 ORPHANED_SECONDS = 2.0
 
-# Progress in the status text of engines, which Blender 5.0 and later give only to handlers.
-SAMPLES = re.compile(r"\bSample (\d+)/(\d+)")
-
 
 class BeamspreadNode(bpy.types.ShaderNodeCustomGroup):
     """Node class that shows its inner tree: the add-on is not registered in this process."""
@@ -76,8 +72,8 @@ def render(request, scene, progress) -> dict:
     scene.render.use_overwrite, scene.render.use_placeholder = True, False
     scene.render.filepath, scene.render.use_file_extension = request["picture"], False
     compat.save_as_multilayer_exr(scene)
-    bpy.app.handlers.render_stats.append(lambda text, *_: _report(progress, text))
-    notes = _render_denoised(scene, {"write_still": True, "scene": scene.name, "layer": request["view_layer"]})
+    with child_world.counting_samples(progress):
+        notes = _render_denoised(scene, {"write_still": True, "scene": scene.name, "layer": request["view_layer"]})
     return {"frame": np.array(scene.frame_current), "notes": np.array(notes, dtype=str)}
 
 
@@ -99,11 +95,6 @@ def _render_denoised(scene, options: dict) -> list[str]:
     scene.cycles.use_denoising = False
     bpy.ops.render.render(**options)
     return [note]
-
-
-def _report(progress, text) -> None:
-    if isinstance(text, str) and (match := SAMPLES.search(text)):
-        progress(int(match[1]) / max(int(match[2]), 1))
 
 
 TASKS = {

@@ -4,7 +4,10 @@ Part of the child process (child.py).
 """
 
 import math
+import re
 import tempfile
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 
 import bpy
@@ -16,9 +19,15 @@ from .. import compat
 # diffuse ray else.
 LIGHT_PATH = {"Is Diffuse Ray": 1.0, "Ray Depth": 1.0, "Diffuse Depth": 1.0}
 
+# Progress in the status text of engines.
+SAMPLES = re.compile(r"\bSample (\d+)/(\d+)")
+
 # Side in texels of tiles, and the number of tiles with the largest range of radiance, as around a sun of few texels,
 # that are rendered again with more samples.
 TILE, TILES = 32, 12
+
+# Fraction of the time that the whole panorama takes; its uneven tiles take the rest.
+FIRST_SHARE = 0.7
 
 # Rows of a panorama without detail, at least, and the fraction of its light that may change its texel at each step
 # toward that. More rows and less change: slower bakes.
@@ -38,13 +47,30 @@ def panorama(request, scene, progress) -> dict:
     studio.world = world
     studio.frame_set(scene.frame_current, subframe=scene.frame_subframe)
     set_up(studio, *size)
-    radiance = render(studio, request["samples"])
-    progress(0.7)
+    with counting_samples(lambda done: progress(FIRST_SHARE * done)):
+        progress(f"span 0.0 {FIRST_SHARE}")  # the parent counts the samples that Cycles prints before Blender 5.0
+        radiance = render(studio, request["samples"])
+    progress(FIRST_SHARE)
     tiles = uneven_tiles(radiance)
     for number, (row, column) in enumerate(tiles):
         refine(studio, radiance, row, column, request["fine_samples"])
-        progress(0.7 + 0.3 * (number + 1) / len(tiles))
+        progress(FIRST_SHARE + (1 - FIRST_SHARE) * (number + 1) / len(tiles))
     return {"radiance": coarsened(radiance)}
+
+
+@contextmanager
+def counting_samples(progress) -> Iterator[None]:
+    """Call `progress` with the finished fraction of the samples that Cycles reports to handlers (Blender 5.0 on)."""
+
+    def count(text, *_) -> None:
+        if isinstance(text, str) and (match := SAMPLES.search(text)):
+            progress(int(match[1]) / max(int(match[2]), 1))
+
+    bpy.app.handlers.render_stats.append(count)
+    try:
+        yield
+    finally:
+        bpy.app.handlers.render_stats.remove(count)
 
 
 def lights_diffuse(world) -> bool:

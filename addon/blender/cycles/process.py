@@ -205,7 +205,7 @@ class _Child:
 
     def _begin(self) -> None:
         self.fraction, self.has_answered, self.heard = 0.0, False, time.monotonic()
-        self.error = ""
+        self.error, self._span = "", (0.0, 1.0) if self._counts_samples else None
         self.last_lines: deque[str] = deque(maxlen=LAST_LINES)
         self._finished.clear()
 
@@ -247,10 +247,14 @@ class _Child:
                     self._finished.set()
                 elif word == "error":
                     self.error = rest
+                elif word == "span":
+                    self._span = tuple(map(float, rest.split()))
                 else:
                     self.fraction, self.has_answered = float(word), True
-            elif self._counts_samples and (match := SAMPLES.search(line)):
-                self.fraction = int(match[1]) / max(int(match[2]), 1)
+            elif self._span is not None and (match := SAMPLES.search(line)):
+                start, end = self._span
+                # The tiles that follow a panorama are rendered with their own samples.
+                self.fraction = max(self.fraction, start + (end - start) * int(match[1]) / max(int(match[2]), 1))
             elif line.strip():
                 self.last_lines.append(line.strip())
         self._process.wait()

@@ -75,7 +75,7 @@ class BEAMSPREAD_PT_render(RenderPanel, bpy.types.Panel):
         column = layout.column()
         settings = context.scene.beamspread
         column.prop(settings, "output")
-        column.prop(settings, "use_size")
+        column.row(heading="Resolution").prop(settings, "use_size", text="From Size")
         column.prop(settings, "texel_density" if settings.use_size else "resolution")
         draw_image_buttons(column, context)  # beside the resolution, which existing images don't follow
         column.prop(settings, "use_indirect")
