@@ -11,8 +11,7 @@ MM = 0.001
 # Turned shapes as in marble_floor.py: radius,height in millimetres.
 SHADE = "96,0 95,15 92,40 84,75 72,105 60,122"
 STAND = "0,0 0,0 55,0 55,0 55,4 52,7 12,11 6,20 5,60 6,120 5,120 0,120"
-BULB = "0,0 6,2 12,10 15,20 13,31 6,38 0,40"
-SHADE_HEIGHT, BULB_HEIGHT = 105 * MM, 125 * MM
+SHADE_HEIGHT, BULB_HEIGHT = 105 * MM, 145 * MM
 
 
 def build():
@@ -32,13 +31,12 @@ def build():
     parts.lathe("Shade", parts.rounded(SHADE, 8), paper, (0, 0, SHADE_HEIGHT), MM)
     brass = parts.plain_material("Stand", (0.10, 0.075, 0.05), roughness=0.4)
     parts.lathe("Stand", parts.rounded(STAND), brass, (0, 0, 0), MM)
-    glow = parts.glowing_material("Bulb", (1.0, 0.8, 0.5), (1.0, 0.75, 0.45), 350.0)
-    glow.cycles.sample_as_light = True
-    parts.lathe("Bulb", parts.rounded(BULB), glow, (0, 0, BULB_HEIGHT), MM)
     wood = parts.plain_material("Table", (0.14, 0.085, 0.05), roughness=0.5)
     parts.box("Table", (-0.8, -0.5, -0.02), (0.8, 0.30, 0.0), wood)
     plaster = parts.plain_material("Wall", (0.30, 0.33, 0.36), roughness=0.9, specular=0.1)
     parts.box("Wall", (-0.8, 0.30, -0.02), (0.8, 0.34, 0.9), plaster)
+    bulb = parts.point_lamp("Bulb", (0, 0, BULB_HEIGHT), 2.2, (1.0, 0.75, 0.45))
+    bulb.data.shadow_soft_size = 15 * MM
     sky = scene.world.node_tree.nodes["Background"].inputs
     sky["Color"].default_value, sky["Strength"].default_value = (0.45, 0.6, 1.0, 1.0), 0.05
     scene.cycles.caustics_reflective = scene.cycles.caustics_refractive = False

@@ -29,7 +29,7 @@ KINDS = {
     "jade_bowl": ["AreaLight", "MeshLight", "PointLight"],
     "marble_head": ["SunLight", "WorldLight"],
     "paper_page": ["PointLight", "WorldLight"],
-    "paper_shade": ["MeshLight", "WorldLight"],
+    "paper_shade": ["PointLight", "WorldLight"],
 }
 PARTS = {"soap_bar": 1, "plank_floor": 35, "acrylic_letters": 6}
 

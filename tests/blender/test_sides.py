@@ -30,7 +30,7 @@ def settings():
     settings.quality, settings.margin, settings.use_indirect = "preview", 0, False
     settings.use_size, settings.resolution = False, 32
     yield settings
-    settings.use_live = False
+    bpy.context.scene.beamspread.use_live = False  # tests open files
 
 
 @pytest.fixture(scope="module")
