@@ -4,11 +4,23 @@
 #include <sstream>
 #include <utility>
 
+#include "base/constants.h"
 #include "base/error.h"
 #include "base/threads.h"
 #include "ldf/library/ldf_library.h"
 
 namespace beamspread {
+
+namespace {
+
+// Fraction of the light that enters below which an exit of the unscattered beam is left out. Larger: larger errors.
+constexpr double negligible_exit = 1e-5;
+
+// Number of harmonics of an exit. Sums over square grids of samples don't resolve more: the neighbours of a sample lie at
+// the maxima of cos(4 phi).
+constexpr std::size_t exit_harmonics = 4;
+
+}  // namespace
 
 LdfLibrary LdfLibrary::with_curved(std::vector<CurvedPart> parts) const
 {
@@ -82,11 +94,33 @@ LdfLibrary::SplitWeights LdfLibrary::split_weights(const AngleWeights& weights, 
     return split;
 }
 
+void LdfLibrary::add_unscattered(std::vector<RadialProfile>& profiles, Side side) const
+{
+    const std::vector<double>& angles = m_nodes[static_cast<std::size_t>(side)].angles_deg();
+    const auto exits_at = [&](double angle_deg) {
+        return ballistic_exits(m_medium, refracted_angle(angle_deg * radians_per_degree, m_medium.ior), side);
+    };
+    for (std::size_t j = 0; j < angles.size(); ++j) {
+        const auto nearest = exits_at(0.5 * (angles[j] + angles[j == 0 ? 0 : j - 1]));
+        const auto farthest = exits_at(0.5 * (angles[j] + angles[std::min(j + 1, angles.size() - 1)]));
+        const auto exits = exits_at(angles[j]);
+        for (std::size_t k = 0; k < std::min({nearest.size(), exits.size(), farthest.size()}); ++k)
+            if (exits[k].power >= negligible_exit) {
+                RadialProfile exit = on_axis(nearest[k].u, farthest[k].u, exits[k].power);
+                exit.keep_harmonics(exit_harmonics);
+                profiles[j].add(exit, 1.0, 1.0);
+            }
+    }
+}
+
 std::vector<RadialProfile> LdfLibrary::curved_node_profiles(double albedo, Side side, std::size_t curvature) const
 {
     const CurvedPart* part = curved_part(curvature);
-    if (!part)
-        return node_profiles(albedo, side);
+    if (!part) {
+        std::vector<RadialProfile> flat = node_profiles(albedo, side);
+        add_unscattered(flat, side);
+        return flat;
+    }
     const RadialEnd end = part->curvature > 0.0 ? RadialEnd::abrupt : RadialEnd::faded;
     const std::vector<RadialProfile> curved = part->library->simulated_profiles(albedo, side, {}, end).front();
     if (part->library->angles_deg() == angles_deg())

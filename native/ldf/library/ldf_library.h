@@ -169,6 +169,10 @@ private:
     };
     // Weights of the two curvatures around. Throws InvalidArgument.
     std::array<CurvatureWeight, 2> curvature_weights(double curvature) const;
+
+    // Adds the unscattered light of slabs to `node_profiles`, between the exits halfway to the neighbouring angles.
+    void add_unscattered(std::vector<RadialProfile>& profiles, Side side) const;
+
     const CurvedPart* curved_part(std::size_t curvature) const;  // null for the plane
 
     // Weights of the plane's simulated angles and of a part's, for weights of the plane's angles.

@@ -30,7 +30,7 @@ public:
 
     // `node_profiles` on a surface of `curvatures()[curvature]`. The radius r is the chord, the straight distance of entry
     // and exit: the area within it is pi r^2 on a ball as on a plane. The azimuth is that of the chord in the tangent plane
-    // of the entry.
+    // of the entry. Includes unscattered light of slabs: solvers of curved surfaces know no other.
     virtual std::vector<RadialProfile> curved_node_profiles(double albedo, Side side, std::size_t /*curvature*/) const
     {
         return node_profiles(albedo, side);

@@ -128,4 +128,7 @@ private:
 // it: a peak at the old pole is blurred.
 RadialProfile recentred(const RadialProfile& profile, double centre);
 
+// Power on the axis phi = 0, even between two radii (mean free paths), as exactly as the harmonics resolve it.
+RadialProfile on_axis(double from, double to, double power);
+
 }  // namespace beamspread

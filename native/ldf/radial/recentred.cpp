@@ -102,6 +102,13 @@ void add_ring(const RadialProfile& profile, double shift, double inner, double o
 
 }  // namespace
 
+RadialProfile on_axis(double from, double to, double power)
+{
+    Moments moments;
+    moments.add(from, to, 1.0, power);
+    return moments.profile(0.0);
+}
+
 RadialProfile recentred(const RadialProfile& profile, double centre)
 {
     const double shift = profile.centre() - centre;
