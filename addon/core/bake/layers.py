@@ -15,7 +15,6 @@ from ..progress import Callback, Progress
 from ..scene.bent_grid import AnyGrid, BentGrid
 from ..scene.illumination import Illumination
 from .bake_settings import COMBINED, DIRECTION, IRRADIANCE, BakeSettings
-from .straight import straight_through
 from .surface import channel_media
 
 # Fraction of a bake's time that loading known libraries takes.
@@ -157,11 +156,6 @@ def spread_side(
         of_group = _spread_group(side, group, *rest, count, part, bytes_for_light, seed, report_noise, report_bend)
         for number, luminance in zip(numbers, of_group):
             luminances[number] = luminance
-    for number, grid in enumerate(grids):
-        if side == "transmitted" and isinstance(grid, BentGrid):
-            all_rays = min(RAYS_PER_SAMPLE * settings.samples**2, MAX_RAYS_BY_SAMPLES)
-            straight = straight_through(grid, illumination, sources, settings.samples, all_rays, settings.threads)
-            luminances[number] = luminances[number] + straight
     return luminances
 
 

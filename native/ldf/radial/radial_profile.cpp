@@ -108,10 +108,10 @@ RadialProfile::RadialProfile(double centre, std::span<const double> bin_moments,
         m_slope[k] = slope_at(i, detail, end);
         // Limit the slopes to three times those of the adjacent chords, which makes C_0 monotone and the azimuthal mean
         // of g positive (Fritsch, Carlson 1980, doi:10.1137/0717021).
-        const auto chord = [&](std::size_t end) {
-            return end == 0 ? (m_total[0] - m_remaining[0][0]) / radial_edge(0)
-                            : (m_remaining[knot[end - 1]][0] - m_remaining[knot[end]][0]) /
-                                  (radial_edge(knot[end]) - radial_edge(knot[end - 1]));
+        const auto chord = [&](std::size_t at) {
+            return at == 0 ? (m_total[0] - m_remaining[0][0]) / radial_edge(0)
+                           : (m_remaining[knot[at - 1]][0] - m_remaining[knot[at]][0]) /
+                                 (radial_edge(knot[at]) - radial_edge(knot[at - 1]));
         };
         const double limit = 3.0 * std::min(chord(i), chord(i + 1));
         m_slope[k][0] = std::clamp(m_slope[k][0], 0.0, std::max(0.0, limit));
