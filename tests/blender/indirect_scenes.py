@@ -16,6 +16,15 @@ def add_wall(color=(0.9, 0.6, 0.3)):
     return wall
 
 
+def add_ball():
+    """A smooth ball of a radius of 1 that floats above the floor."""
+    bpy.ops.mesh.primitive_uv_sphere_add(segments=32, ring_count=16, location=(0, 0, 1.5))
+    ball = bpy.context.object
+    bpy.ops.object.shade_smooth()
+    ball.data.materials.append(scenes.add_material())
+    return ball
+
+
 def add_scene(material=None):
     floor = scenes.add_plane(
         "Floor", material=material or scenes.add_material(color_mode="BASE_COLOR", base_color=(GREY,) * 3)

@@ -5,17 +5,8 @@ import bpy
 import numpy as np
 import pytest
 import scenes
-from indirect_scenes import baked
-
-ALBEDO = 0.5
-
-
-def add_ball():
-    bpy.ops.mesh.primitive_uv_sphere_add(segments=32, ring_count=16, location=(0, 0, 1.5))
-    ball = bpy.context.object
-    bpy.ops.object.shade_smooth()
-    ball.data.materials.append(scenes.add_material())
-    return ball
+from indirect_scenes import GREY as ALBEDO
+from indirect_scenes import add_ball, baked
 
 
 @pytest.mark.parametrize("output", ["IRRADIANCE", "LUMINANCE"])

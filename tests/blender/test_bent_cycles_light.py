@@ -4,8 +4,8 @@ import bpy
 import numpy as np
 import pytest
 import scenes
-from indirect_scenes import baked, jobs_of
-from test_bent_bounced import ALBEDO, add_ball
+from indirect_scenes import GREY as ALBEDO
+from indirect_scenes import add_ball, baked, jobs_of
 
 
 def checkered(color_input="Color", kind="ShaderNodeBsdfDiffuse", grey=ALBEDO):
