@@ -134,6 +134,7 @@ void bind_occluders(py::module_& m);
 void bind_bent_texels(py::module_& m);
 void bind_scene(py::module_& m);
 void bind_solve(py::module_& m);
+void bind_textured(py::module_& m);
 void bind_bake(py::module_& m);
 
 }  // namespace beamspread

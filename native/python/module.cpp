@@ -38,5 +38,6 @@ PYBIND11_MODULE(_native, m)
     bind_scene(m);
     bind_bent_texels(m);
     bind_solve(m);
+    bind_textured(m);
     bind_bake(m);
 }

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import TypeAlias
 
 import numpy as np
@@ -14,6 +14,7 @@ from ..ldf.library import library
 from ..material import Material
 from ..native import native
 from ..progress import Callback, Progress
+from .textured import NOISE, Lights, is_map, textured_luminance
 
 Ldf: TypeAlias = (
     "native.LdfSource | native.LdfSample | Sequence[native.LdfSample]"
@@ -37,6 +38,7 @@ def luminance(
     threads: int = 0,
     progress: Callback | None = None,
     side: str = "reflected",
+    albedo: ArrayLike | None = None,
 ) -> NDArray[np.float32]:
     """Luminance that beams on a regular grid cause on a plane of a material.
 
@@ -53,6 +55,8 @@ def luminance(
         Metres; inf for a half-space.
     quality : {"final", "preview"}
         Quality of the LDFs, as for `library`.
+    albedo : array_like, shape (H, W) or (H, W, 3), optional
+        Albedo of each texel in place of the material's, as for `convolve`.
 
     Returns
     -------
@@ -83,7 +87,7 @@ def luminance(
         irradiance,
         direction,
         [ldfs[medium] for medium in media],
-        material.albedo,
+        material.albedo if albedo is None else albedo,
         material.mean_free_path,
         pitch,
         solver,
@@ -98,7 +102,7 @@ def convolve(
     irradiance: ArrayLike,
     direction: ArrayLike,
     ldf: Ldf,
-    albedo: float | Sequence[float],
+    albedo: ArrayLike,
     mean_free_path: float | Sequence[float],
     pitch: float | Sequence[float],
     solver: str = "fft",
@@ -107,6 +111,8 @@ def convolve(
     progress: Callback | None = None,
     interpolation: str = "angular",
     side: str = "reflected",
+    noise: float = NOISE,
+    report_noise: Callable[[float], None] | None = None,
 ) -> NDArray[np.float32]:
     """Luminance that beams on a regular grid of a plane cause (Manabe et al. 2012, Eq. 2).
 
@@ -122,8 +128,10 @@ def convolve(
         sequence as for `interpolate`) represent the LDFs between them and beams of their diameter; angles and albedos
         outside of them are errors. Their images enter as rings around O with azimuthal harmonics, which keep their
         power but no detail finer than a fifth of the distance from O.
-    albedo : float or sequence of three
-        Single-scattering albedo, 0 <= albedo < 1.
+    albedo : float or sequence of three, or array_like, shape (H, W) or (H, W, 3)
+        Single-scattering albedo, 0 <= albedo < 1: of the medium, or of each texel. A map goes straight down into the
+        medium, and on beyond its border. Paths of light that all texels share correct the convention for textures,
+        which the solver computes; needs an LdfLibrary.
     mean_free_path : float or sequence of three
         Metres.
     pitch : float or (float, float)
@@ -145,6 +153,11 @@ def convolve(
         Side of the luminance: where light enters, or the far side of a slab, at the texels opposite the lit ones.
         Unscattered light that crosses the slab is included. Rows, columns and directions stay those of the lit side.
         Half-spaces and samples know no far side.
+    noise : float
+        Wanted root mean square error of a texel by the paths through a map of albedos, relative to the mean.
+    report_noise : callable, optional
+        report_noise(error) takes that error as estimated, of the worst channel. It is larger than `noise` where that
+        would take more than some seconds, as between black and nearly white.
 
     Returns
     -------
@@ -160,14 +173,26 @@ def convolve(
     """
     light = irradiance, direction
     return convolve_lights(
-        [light], ldf, albedo, mean_free_path, pitch, solver, tolerance, threads, progress, interpolation, side
+        [light],
+        ldf,
+        albedo,
+        mean_free_path,
+        pitch,
+        solver,
+        tolerance,
+        threads,
+        progress,
+        interpolation,
+        side,
+        noise,
+        report_noise,
     )
 
 
 def convolve_lights(
     lights: Sequence[tuple[ArrayLike, ArrayLike]],
     ldf: Ldf,
-    albedo: float | Sequence[float],
+    albedo: ArrayLike,
     mean_free_path: float | Sequence[float],
     pitch: float | Sequence[float],
     solver: str = "fft",
@@ -176,6 +201,8 @@ def convolve_lights(
     progress: Callback | None = None,
     interpolation: str = "angular",
     side: str = "reflected",
+    noise: float = NOISE,
+    report_noise: Callable[[float], None] | None = None,
 ) -> NDArray[np.float32]:
     """Luminance of several lights together: the sum of the results of `convolve` for each.
 
@@ -191,23 +218,28 @@ def convolve_lights(
     float32, shape (H, W, 3)
         Luminance, radiance in W/(m^2 sr).
     """
-    arriving = [
-        light
-        for irradiance, direction in lights
-        for light in native.PlaneLight.of_channels(_irradiance(irradiance), float_array("direction", direction), 3)
-    ]
-    return native.convolve(
-        arriving,
-        _sources(ldf, interpolation),
-        _rgb("albedo", albedo),
-        _rgb("mean_free_path", mean_free_path),
-        _pair("pitch", pitch),
-        solver,
-        float(tolerance),
-        int(threads),
-        progress,
-        side=side,
-    )
+    arriving = [(_irradiance(values), float_array("direction", direction)) for values, direction in lights]
+    sources, paths = _sources(ldf, interpolation), _rgb("mean_free_path", mean_free_path)
+
+    def solve(lights: Lights, albedos: Sequence[float], part: Callback | None) -> NDArray[np.float32]:
+        return native.convolve(
+            [light for values, direction in lights for light in native.PlaneLight.of_channels(values, direction, 3)],
+            sources,
+            albedos,
+            paths,
+            _pair("pitch", pitch),
+            solver,
+            float(tolerance),
+            int(threads),
+            part,
+            side=side,
+        )
+
+    if not is_map(albedo):
+        return solve(arriving, _rgb("albedo", albedo), progress)
+    whole = Progress.of(progress)
+    rest = side, noise, int(threads), whole, report_noise
+    return textured_luminance(arriving, sources, albedo, paths, _pair("pitch", pitch), solve, *rest)
 
 
 def _irradiance(values: ArrayLike) -> NDArray[np.float32]:

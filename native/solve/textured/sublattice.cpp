@@ -1,0 +1,79 @@
+#include "solve/textured/sublattice.h"
+
+#include <algorithm>
+
+#include "solve/textured/path_products.h"
+
+namespace beamspread {
+
+namespace {
+
+// Sublattices along each axis at most, and texels of each that they leave on the longer side. More: neighbors share paths at
+// a greater distance, so that errors are finer, and more paths are drawn.
+constexpr std::size_t max_side = 8;
+
+std::ptrdiff_t floor_div(std::ptrdiff_t value, std::ptrdiff_t divisor)
+{
+    return value >= 0 ? value / divisor : -((-value + divisor - 1) / divisor);
+}
+
+}  // namespace
+
+const std::size_t Sublattices::run_length = texels_per_run;
+
+Sublattices::Sublattices(std::size_t width, std::size_t height, std::size_t reach)
+    : m_width(width), m_height(height), m_side(max_side)
+{
+    m_rows = (height + m_side - 1) / m_side;
+    m_runs = ((width + m_side - 1) / m_side + run_length - 1) / run_length;
+    m_reach = std::min(reach, std::max(width, height));
+    m_border = (m_reach + m_side - 1) / m_side + 1;
+}
+
+std::size_t Sublattices::run(std::size_t row, std::size_t number) const
+{
+    return (row + m_border) * (m_runs * run_length + 2 * m_border) + m_border + number * run_length;
+}
+
+bool Sublattices::is_within(const PathPlace& place) const
+{
+    const auto reach = static_cast<std::int32_t>(m_reach);
+    return std::abs(place.x) <= reach && std::abs(place.y) <= reach;
+}
+
+std::ptrdiff_t Sublattices::offset(std::size_t sublattice, const PathPlace& place) const
+{
+    const auto side = static_cast<std::ptrdiff_t>(m_side);
+    const auto reach = static_cast<std::int32_t>(m_reach);
+    const std::ptrdiff_t x = static_cast<std::ptrdiff_t>(sublattice % m_side) + std::clamp(place.x, -reach, reach);
+    const std::ptrdiff_t y = static_cast<std::ptrdiff_t>(sublattice / m_side) + std::clamp(place.y, -reach, reach);
+    const std::ptrdiff_t across = floor_div(x, side), up = floor_div(y, side);
+    const auto stride = static_cast<std::ptrdiff_t>(m_runs * run_length + 2 * m_border);
+    const auto plane = stride * static_cast<std::ptrdiff_t>(m_rows + 2 * m_border);
+    return ((y - up * side) * side + x - across * side) * plane + up * stride + across;
+}
+
+AlignedVector<float> Sublattices::dealt(const View2D<const float>& values, float factor, bool goes_on) const
+{
+    const std::size_t stride = m_runs * run_length + 2 * m_border, rows = m_rows + 2 * m_border;
+    AlignedVector<float> plane(count() * rows * stride);
+    const auto side = static_cast<std::ptrdiff_t>(m_side), border = static_cast<std::ptrdiff_t>(m_border);
+    const auto width = static_cast<std::ptrdiff_t>(m_width), height = static_cast<std::ptrdiff_t>(m_height);
+    parallel_for(count() * rows, [&](std::size_t task) {
+        const auto sublattice = static_cast<std::ptrdiff_t>(task / rows);
+        const std::ptrdiff_t y = (static_cast<std::ptrdiff_t>(task % rows) - border) * side + sublattice / side;
+        if (!goes_on && (y < 0 || y >= height))
+            return;
+        const auto row = static_cast<std::size_t>(std::clamp<std::ptrdiff_t>(y, 0, height - 1));
+        float* const filled = plane.data() + task * stride;
+        for (std::size_t column = 0; column < stride; ++column) {
+            const std::ptrdiff_t x = (static_cast<std::ptrdiff_t>(column) - border) * side + sublattice % side;
+            if (goes_on || (x >= 0 && x < width))
+                filled[column] =
+                    factor * values(row, static_cast<std::size_t>(std::clamp<std::ptrdiff_t>(x, 0, width - 1)));
+        }
+    });
+    return plane;
+}
+
+}  // namespace beamspread

@@ -1,0 +1,248 @@
+#include "solve/textured/textured.h"
+
+#include <algorithm>
+#include <atomic>
+#include <cmath>
+#include <functional>
+#include <string>
+#include <utility>
+
+#include "base/error.h"
+#include "base/random.h"
+#include "base/threads.h"
+#include "solve/textured/path_products.h"
+#include "solve/textured/shared_paths.h"
+#include "solve/textured/smooth_ratio.h"
+#include "solve/textured/sublattice.h"
+
+namespace beamspread {
+
+namespace {
+
+// Walks for each texel of the first round, which shows the noise, and the most of a round relative to all before.
+constexpr std::size_t first_walks = 128;
+constexpr std::size_t max_growth = 7;
+
+// Farthest place from an exit, in texels, that fewer paths than this fraction pass; they count as at that distance.
+constexpr double rarely = 1e-3;
+
+// Paths survive a scattering with this power of the brightest albedo; their weights stay finite below 2. Larger: shorter
+// paths, more noise.
+constexpr double survival_power = 1.5;
+
+// Largest probability to survive a scattering. Nearer to 1: longer paths in textures of little absorption.
+constexpr double max_survival = 0.9999;
+
+// Stream of random numbers of the paths.
+constexpr std::uint64_t path_stream = 0x7e87;
+
+float largest(const View2D<const float>& values)
+{
+    float most = 0.0f;
+    for (std::size_t y = 0; y < values.height; ++y)
+        for (std::size_t x = 0; x < values.width; ++x)
+            most = std::max(most, values(y, x));
+    return most;
+}
+
+// Distance that all but a few paths stay within, texels.
+std::size_t reach_of(const std::vector<PathPlan>& plans, std::uint64_t seed)
+{
+    std::vector<std::int32_t> farthest;
+    for (std::size_t i = 0; i < plans.size(); ++i) {
+        SharedPaths paths;
+        Random random(seed, path_stream, ~static_cast<std::uint64_t>(i));
+        add_paths(paths, plans[i], 4096, random);
+        for (std::size_t p = 0; p < paths.size(); ++p) {
+            std::int32_t most = 0;
+            for (std::size_t k = paths.first[p]; k < paths.first[p + 1]; ++k)
+                most = std::max({most, std::abs(paths.places[k].x), std::abs(paths.places[k].y)});
+            farthest.push_back(most);
+        }
+    }
+    if (farthest.empty())
+        return 1;
+    const auto at = static_cast<std::ptrdiff_t>((1.0 - rarely) * static_cast<double>(farthest.size() - 1));
+    std::ranges::nth_element(farthest, farthest.begin() + at);
+    return static_cast<std::size_t>(std::max(farthest[static_cast<std::size_t>(at)], 1));
+}
+
+class Textured {
+public:
+    explicit Textured(const TexturedProblem& problem)
+        : m_problem(problem),
+          m_survival(std::clamp(std::pow(static_cast<double>(largest(problem.albedo)), survival_power),
+                                problem.mean_albedo, max_survival)),
+          m_plans(plans_of(problem, m_survival)),
+          m_sublattices(problem.albedo.width, problem.albedo.height, reach_of(m_plans, problem.seed)),
+          m_albedo(m_sublattices.dealt(problem.albedo, static_cast<float>(1.0 / m_survival), true))
+    {
+        for (const TexturedLight& light : problem.lights) {
+            m_light.push_back(m_sublattices.dealt(light.irradiance, 1.0f, false));
+            std::vector<float> entering(texels());
+            for (std::size_t y = 0; y < problem.albedo.height; ++y)
+                for (std::size_t x = 0; x < problem.albedo.width; ++x)
+                    entering[y * problem.albedo.width + x] = light.irradiance(y, x) * problem.factor(y, x);
+            const View2D<const float> view{entering.data(), problem.albedo.height, problem.albedo.width,
+                                           static_cast<std::ptrdiff_t>(problem.albedo.width)};
+            m_plain_light.push_back(m_sublattices.dealt(view, 1.0f, false));
+        }
+        for (std::size_t h = 0; h < 2; ++h) {
+            m_sums.textured[h].resize(texels());
+            m_sums.plain[h].resize(texels());
+        }
+    }
+
+    std::size_t texels() const { return m_problem.albedo.width * m_problem.albedo.height; }
+
+    // Adds the paths of this many walks for each texel, half of them to each half.
+    void add(std::size_t walks, const std::function<void(double)>& advance)
+    {
+        ++m_rounds;
+        std::atomic<std::size_t> places{0};
+        parallel_for(2 * m_sublattices.count(), [&](std::size_t task) {
+            const std::size_t half = task / m_sublattices.count(), sublattice = task % m_sublattices.count();
+            const std::size_t run_count = m_sublattices.rows() * m_sublattices.runs();
+            AlignedVector<float> textured(run_count * texels_per_run), plain(run_count * texels_per_run);
+            for (std::size_t i = 0; i < m_plans.size(); ++i) {
+                Random random(m_problem.seed + m_rounds, path_stream, task * m_plans.size() + i);
+                SharedPaths paths;
+                add_paths(paths, m_plans[i], walks / 2, random);
+                places += paths.places.size();
+                add_products(paths, sublattice, i, textured.data(), plain.data());
+            }
+            const std::size_t width = m_problem.albedo.width;
+            m_sublattices.for_texels(sublattice, [&](std::size_t y, std::size_t x, std::size_t k) {
+                m_sums.textured[half][y * width + x] += textured[k] / m_problem.factor(y, x);
+                m_sums.plain[half][y * width + x] += plain[k];
+            });
+            advance(1.0 / static_cast<double>(2 * m_sublattices.count()));
+        });
+        // Each sublattice has its own paths, which all of its texels take.
+        m_products +=
+            static_cast<double>(places) / static_cast<double>(m_sublattices.count()) * static_cast<double>(texels());
+    }
+
+    // Scatterings of all texels in the walks so far.
+    double products() const { return m_products; }
+
+    // Writes the ratio of each texel; returns the estimated error.
+    double ratio(std::vector<float>& ratio) const
+    {
+        std::vector<float> scale(texels());
+        for (std::size_t y = 0; y < m_problem.albedo.height; ++y)
+            copy_row(m_problem.convention, y, 0, m_problem.albedo.width, scale.data() + y * m_problem.albedo.width);
+        return smooth_ratio(m_sums, scale, m_problem.albedo.width, m_problem.albedo.height, ratio);
+    }
+
+private:
+    static std::vector<PathPlan> plans_of(const TexturedProblem& problem, double survival)
+    {
+        std::vector<PathPlan> plans;
+        for (const TexturedLight& light : problem.lights)
+            plans.push_back({problem.medium, light.travel, survival, problem.texels_per_path, problem.is_through});
+        return plans;
+    }
+
+    void add_products(const SharedPaths& paths, std::size_t sublattice, std::size_t light, float* textured,
+                      float* plain) const
+    {
+        std::vector<std::ptrdiff_t> places;
+        std::vector<std::size_t> first{0};
+        std::vector<float> weights;
+        for (std::size_t p = 0; p < paths.size(); ++p) {
+            const std::size_t begin = paths.first[p], end = paths.first[p + 1];
+            if (!m_sublattices.is_within(paths.places[begin]))
+                continue;  // light enters outside of the plane, or too far to matter
+            for (std::size_t k = begin; k < end; ++k)
+                places.push_back(m_sublattices.offset(sublattice, paths.places[k]));
+            first.push_back(places.size());
+            weights.push_back(
+                static_cast<float>(std::pow(m_problem.mean_albedo / m_survival, static_cast<double>(end - begin - 1))));
+        }
+        const PlacedPaths placed{places, first, weights};
+        for (std::size_t row = 0; row < m_sublattices.rows(); ++row) {
+            for (std::size_t number = 0; number < m_sublattices.runs(); ++number) {
+                const std::size_t at = m_sublattices.run(row, number);
+                const std::size_t to = (row * m_sublattices.runs() + number) * texels_per_run;
+                add_path_products(placed, m_light[light].data() + at, m_plain_light[light].data() + at,
+                                  m_albedo.data() + at, textured + to, plain + to);
+            }
+        }
+    }
+
+    const TexturedProblem& m_problem;
+    double m_survival;
+    std::vector<PathPlan> m_plans;
+    Sublattices m_sublattices;
+    AlignedVector<float> m_albedo;
+    std::vector<AlignedVector<float>> m_light;
+    std::vector<AlignedVector<float>> m_plain_light;
+    PathSums m_sums;
+    std::uint64_t m_rounds = 0;
+    double m_products = 0.0;
+};
+
+void check(const TexturedProblem& problem)
+{
+    validate(problem.medium);
+    const auto differs = [&](const View2D<const float>& view) {
+        return view.height != problem.albedo.height || view.width != problem.albedo.width;
+    };
+    if (problem.albedo.height * problem.albedo.width == 0 || differs(problem.factor) || differs(problem.convention))
+        reject("albedo", "of another size", "one value for each texel");
+    for (const TexturedLight& light : problem.lights)
+        if (differs(light.irradiance))
+            reject("irradiance", "of another size", "one value for each texel");
+    for (std::size_t y = 0; y < problem.albedo.height; ++y) {
+        for (std::size_t x = 0; x < problem.albedo.width; ++x) {
+            const float albedo = problem.albedo(y, x);
+            if (!(albedo >= 0.0f && albedo < 1.0f))
+                reject("albedo", std::to_string(albedo), "0 or more and below 1");
+            if (!(problem.factor(y, x) > 0.0f))
+                reject("factor", std::to_string(problem.factor(y, x)), "above 0");
+        }
+    }
+}
+
+}  // namespace
+
+TexturedError solve_textured(const TexturedProblem& problem, Progress& progress, float* luminance, std::size_t stride)
+{
+    check(problem);
+    progress.set_total(1.0);
+    TexturedError result;
+    std::vector<float> ratio;
+    with_threads(problem.threads, [&] {
+        Textured textured(problem);
+        std::size_t count = std::min(first_walks, problem.max_walks);
+        double left = 1.0;
+        while (true) {
+            // How many rounds follow is not known: each takes half of what is left.
+            const double share = left / 2.0;
+            left -= share;
+            textured.add(count, [&](double part) { progress.advance(share * part); });
+            result.walks += count;
+            result.error = textured.ratio(ratio);
+            const double wanted = static_cast<double>(result.walks) * std::pow(result.error / problem.tolerance, 2);
+            const double affordable =
+                std::min(static_cast<double>(problem.max_walks),
+                         problem.max_products / std::max(textured.products(), 1.0) * static_cast<double>(result.walks));
+            const double more = std::min(wanted, affordable) - static_cast<double>(result.walks);
+            if (more < 2.0)
+                break;
+            count = std::min(static_cast<std::size_t>(more), max_growth * result.walks);
+            count -= count % 2;
+        }
+    });
+    progress.finish();
+    for (std::size_t y = 0; y < problem.albedo.height; ++y) {
+        for (std::size_t x = 0; x < problem.albedo.width; ++x) {
+            const std::size_t i = y * problem.albedo.width + x;
+            luminance[i * stride] = problem.convention(y, x) * ratio[i];
+        }
+    }
+    return result;
+}
+
+}  // namespace beamspread

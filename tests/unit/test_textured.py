@@ -1,0 +1,108 @@
+"""`convolve` with an albedo of each texel."""
+
+import numpy as np
+import pytest
+from beamspread import LdfSample, Medium, convolve, library, luminance, presets
+from beamspread.core.bake.textured import beams_of
+from beamspread.core.native import native
+
+LDF = library(Medium(0.8))
+LIGHT, DOWN = np.ones((48, 40)), (0.6, 0.0, -0.8)
+STRIPES = np.where(np.arange(40) % 10 < 5, 0.95, 0.8) * np.ones((48, 1))
+
+
+def test_a_map_of_one_albedo_is_that_albedo():
+    ours = convolve(LIGHT, DOWN, LDF, np.full((48, 40, 3), 0.75), 1.0, 1.0)
+    np.testing.assert_array_equal(ours, convolve(LIGHT, DOWN, LDF, 0.75, 1.0, 1.0))
+
+
+def test_a_ratio_of_one_without_noise():
+    """Where the map is nearly even, paths with it and without it differ as little, however few they are."""
+    nearly = np.full((48, 40), 0.75)
+    nearly[20, 20] += 1e-6
+    ours = convolve(LIGHT, DOWN, LDF, nearly, 1.0, 1.0, noise=0.1)
+    np.testing.assert_allclose(ours, convolve(LIGHT, DOWN, LDF, 0.75, 1.0, 1.0), rtol=1e-4)
+
+
+def test_the_same_bits_for_any_number_of_threads():
+    one, three = (convolve(LIGHT, DOWN, LDF, STRIPES, 1.0, 1.0, noise=0.05, threads=threads) for threads in (1, 3))
+    np.testing.assert_array_equal(one, three)
+
+
+def test_the_estimated_error_is_the_error():
+    """Against 64 times as many walks with other numbers: between .6 and 1.6 times, at the noise of each number."""
+    factor, even = np.ones((48, 40), np.float32), convolve(LIGHT, DOWN, LDF, 0.9, 1.0, 1.0)[..., 0]
+
+    def with_walks(walks, seed):
+        arguments = LDF.medium, (1.0, 1.0), np.float32(STRIPES), factor, 0.9, np.ascontiguousarray(even)
+        lights = [(np.float32(LIGHT), DOWN)]
+        return native.textured(*arguments, lights, "reflected", 1e-6, walks, seed)
+
+    truth, _, walks = with_walks(16384, 5)
+    assert walks >= 16382
+    for number in (128, 256, 1024):
+        found, error, _ = with_walks(number, 1)
+        actual = np.sqrt(((found - truth) ** 2).mean()) / truth.mean()
+        assert 0.6 * actual < error < 1.6 * actual
+
+
+def test_more_noise_is_allowed_and_reported():
+    errors = []
+    for noise in (0.06, 0.02):
+        convolve(LIGHT, DOWN, LDF, STRIPES, 1.0, 1.0, noise=noise, report_noise=errors.append)
+    assert errors[1] < 0.02 < errors[0] < 0.06
+
+
+def test_channels_have_their_own_maps_and_paths():
+    maps = np.stack([STRIPES, np.full_like(STRIPES, 0.5), np.full_like(STRIPES, 0.9)], -1)
+    ours = convolve(LIGHT, DOWN, LDF, maps, (1.0, 2.0, 3.0), 1.0, noise=0.05)
+    even = convolve(LIGHT, DOWN, LDF, (0.5, 0.5, 0.9), (1, 2, 3), 1.0)
+    np.testing.assert_allclose(ours[..., 1:], even[..., 1:], rtol=1e-5)
+    assert ours[24, 5:35, 0].std() > 0.1 * ours[24, 5:35, 0].mean()
+
+
+def test_luminance_of_a_material_with_a_map():
+    ours = luminance(LIGHT, DOWN, presets()["marble"], 1e-3, albedo=STRIPES, quality="preview")
+    assert ours.shape == (48, 40, 3)
+    assert (ours > 0).all()
+
+
+def test_black_and_nearly_white_side_by_side():
+    ink = np.where(np.arange(40) < 20, 0.0, 0.9999) * np.ones((48, 1))
+    ours = convolve(LIGHT, DOWN, LDF, ink, 2.0, 1.0, noise=0.1)[..., 0]
+    assert np.isfinite(ours).all()
+    assert ours.min() >= 0
+    assert ours[24, 35] > 4 * ours[24, 5]
+
+
+def test_beams_have_all_the_light():
+    y, x = (np.mgrid[:48, :40] + 0.5) - 22
+    way = np.stack([x, y, np.full_like(x, -10)], -1)
+    way = np.float32(way / np.linalg.norm(way, axis=-1, keepdims=True))
+    light = np.random.default_rng(1).random((48, 40, 3)).astype(np.float32)
+    lights = [(light, way), (2 * light, np.float32(DOWN))]
+    beams = beams_of(lights)
+    assert 1 < len(beams) <= 8
+    np.testing.assert_allclose(sum(part for part, _ in beams), 3 * light, rtol=1e-5)
+    for _, direction in beams:
+        assert np.linalg.norm(direction) == pytest.approx(1)
+        assert direction[2] < 0
+
+
+@pytest.mark.parametrize(
+    ("arguments", "name"),
+    [
+        ({"albedo": np.full((48, 40), 1.0)}, "albedo"),
+        ({"albedo": np.full((48, 40), -0.1)}, "albedo"),
+        ({"albedo": np.full((48, 40), np.nan)}, "albedo"),
+        ({"albedo": np.full((40, 48), 0.5)}, "albedo"),
+        ({"albedo": np.full((48, 40, 2), 0.5)}, "albedo"),
+        ({"albedo": STRIPES, "noise": 0.0}, "noise"),
+        ({"albedo": STRIPES, "side": "transmitted"}, "side"),
+        ({"albedo": STRIPES, "ldf": LdfSample(np.ones((8, 8), np.float32), 1.0, 0.0, 0.9)}, "ldf"),
+    ],
+)
+def test_bad_input_is_named(arguments, name):
+    arguments = {"ldf": LDF, **arguments}
+    with pytest.raises(ValueError, match=name):
+        convolve(LIGHT, DOWN, arguments.pop("ldf"), arguments.pop("albedo"), 1.0, 1.0, **arguments)
