@@ -33,10 +33,14 @@ function(ducc_instruction_set name)
   set(ducc_objects ${ducc_objects} ${object} PARENT_SCOPE)
 endfunction()
 
-ducc_instruction_set(baseline)
 if(linux AND x86_64)
-  ducc_instruction_set(avx2 -march=x86-64-v3)
+  # Code counts where there is a faster variant, since a package has all of them for each Python. With -O2 the AVX-512
+  # variant is a third smaller, and transforms take 1.1 times as long.
+  ducc_instruction_set(baseline -Os)
+  ducc_instruction_set(avx2 -march=x86-64-v3 -O2)
   ducc_instruction_set(avx512 -march=x86-64-v4)
+else()
+  ducc_instruction_set(baseline)
 endif()
 list(LENGTH ducc_objects ducc_instruction_set_count)
 add_library(beamspread_ducc STATIC ${ducc_objects})

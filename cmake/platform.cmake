@@ -13,7 +13,9 @@ if(MSVC)
 else()
   set(as_clang "")
   target_compile_options(beamspread_options INTERFACE -Wall -Wextra -Wpedantic -Wconversion -Wshadow
-                         $<$<BOOL:${BEAMSPREAD_WERROR}>:-Werror> -fno-math-errno)
+                         $<$<BOOL:${BEAMSPREAD_WERROR}>:-Werror> -fno-math-errno
+                         # Modules link only the functions that they call.
+                         -ffunction-sections -fdata-sections)
 endif()
 # Contraction to fused multiply-add would make results depend on the compiler's choices.
 target_compile_options(beamspread_options INTERFACE ${as_clang}-ffp-contract=off)

@@ -169,12 +169,12 @@ def test_cancel():
     "medium", [Medium(0.0), Medium(0.8), Medium(0.9, 1.4), Medium(0.7), Medium(-0.5, 1.3)], ids=str
 )
 def test_simulated_curvatures_cover_the_range(medium):
-    """From -1/3 to 1 per transport mean free path. Diameters of balls are edges of bins: four per octave."""
+    """From -1/3 to 2 per transport mean free path. Diameters of balls are edges of bins: four per octave."""
     curvatures = nodes.curvatures_for(medium)
     assert list(curvatures) == sorted(set(curvatures))
     length = 1 / (1 - max(medium.g, 0))
     assert curvatures[0] * length == pytest.approx(-1 / 3)
-    assert 1 <= curvatures[-1] * length <= 1.25
+    assert 2 <= curvatures[-1] * length <= 2.5
     for curvature in curvatures:
         fraction, _ = math.frexp(2 / curvature)
         assert curvature < 0 or fraction * 8 == pytest.approx(round(fraction * 8), abs=1e-9)

@@ -8,13 +8,13 @@ from collections.abc import Callable
 from ..native import native
 from ..progress import Callback as ProgressCallback
 
-PHOTONS = {"preview": 20_000, "final": 400_000}
-"""Photons per curvature and angle for a medium with g .8 and ior 1. More: less noise, larger files, more time."""
+PHOTONS = {"preview": 10_000, "final": 400_000}
+"""Photons per curvature and angle, times a factor by the medium. More: less noise, larger files, more time."""
 
-_MAX_PHOTONS = 600_000
-"""Largest number of photons per curvature and angle. More: less noise in media of little scattering, more time."""
+_LEAST_FACTOR, _LARGEST_FACTOR = 1.5, 2.5
+"""Limits of that factor. Larger: less noise of isotropic media, and of those that scatter forward, and more time."""
 
-_CURVATURES = (-1 / 3, -0.2, -0.1, -0.04, 0.05, 0.1, 1 / 6, 0.25, 5 / 14, 0.5, 5 / 7, 1.0)
+_CURVATURES = (-1 / 3, -0.2, -0.1, -0.04, 0.05, 0.1, 1 / 6, 0.25, 5 / 14, 0.5, 0.7, 1.0, 2.0)
 """Curvatures times the transport mean free path, without 0."""
 
 _ANGLES = {
@@ -56,7 +56,8 @@ def curved_angles_for(medium: native.Medium) -> tuple[float, ...]:
 
 def curved_photons_for(medium: native.Medium, quality: str) -> int:
     """Photons per curvature and angle, for standard errors of totals of about .5 % at most in final quality."""
-    return round(min(PHOTONS[quality] * math.sqrt(5.0 / transport_length(medium)) / medium.ior, _MAX_PHOTONS))
+    factor = transport_length(medium) / 5.0 * medium.ior**2
+    return round(PHOTONS[quality] * min(max(factor, _LEAST_FACTOR), _LARGEST_FACTOR))
 
 
 def with_curvatures(
