@@ -8,7 +8,7 @@ import beamspread
 import bpy
 import numpy as np
 import pytest
-from beamspread.blender.jobs.run.operator import BakeThread
+from beamspread.blender.jobs.run.bake_run import BakeThread
 from beamspread.blender.settings import BeamspreadSettings
 from beamspread.core.bake.bake_settings import COMBINED
 from beamspread.core.bake.layers import LAYERS
