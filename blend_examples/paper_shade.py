@@ -1,8 +1,9 @@
 """The scene paper_shade: a lamp with a shade of paper, a bulb inside, on a table before a wall. Lengths are metres.
 
 The shade is one sheet without a thickness of its own; the node has it. The bulb lights its inside, which is its front,
-since a Screw modifier turns normals inward: the light comes through, and returns from the inside again and again. Both faces have an image. The paper does not
-refract, so that paths can be traced through it (compare.sh does that, through a shade of the same thickness).
+since a Screw modifier turns normals inward: the light comes through, and returns from the inside again and again. Both
+faces have an image. The paper does not refract, so that paths can be traced through it (compare.sh does that, through a
+shade of the same thickness).
 """
 
 import scene_parts as parts
