@@ -27,7 +27,7 @@ from scenes import (
 )
 
 KEYS = {"object", "material", "frame", "path", "width", "height", "seconds", "status", "message"} | {
-    *("output", "lights", "left_out", "indirect", "dark", "estimated_seconds", "exposure"),
+    *("output", "lights", "left_out", "indirect", "dark", "estimated_seconds", "exposure", "side"),
 }
 
 
