@@ -53,14 +53,14 @@ def errors(values, truth, areas):
 
 
 def test_a_ball_is_as_bright_as_in_the_table():
-    """Sphere of 6 transport mean free paths: total 1.5 %, at albedo .6 2.5 %; L1 4 %."""
+    """Sphere of 6 transport mean free paths: total 2 %, .5 % of it the solver's, at albedo .6 2.5 %; L1 4 %."""
     scenes.add_sun(0)
     baked = baked_exitance(ball).mean(1)[::-1]
     truth = np.stack([body_table("ball_6")[albedo][0] for albedo in ALBEDO], -1)
     areas = BODIES["ball_6"][0].areas.reshape(SIZE[1], 2)
     truth = (truth.reshape(SIZE[1], 2, 3) * areas[..., None]).sum(1) / areas.sum(1)[:, None]
     total, l1 = errors(baked[:, None], truth[:, None], areas.sum(1)[:, None])
-    assert (np.abs(total) < (0.025, 0.015, 0.015)).all(), total
+    assert (np.abs(total) < (0.025, 0.02, 0.02)).all(), total
     assert (l1 < 0.04).all(), l1
 
 
@@ -94,7 +94,9 @@ def blocks(values, areas):
 
 
 def test_path_tracing_of_a_lobed_body():
-    """Totals 2 %, the reference's own noise being 1 %; the L1 distance of means of 3 x 3 texels 4 % beyond noise."""
+    """Totals 2.5 %, 1 % of it the reference's noise and .5 % the solver's tolerance.
+
+    The L1 distance of means of 3 x 3 texels 4 % beyond noise."""
     scenes.add_sun(25, azimuth_deg=70)
     areas = areas_of(head, SIZE)
     traced = [cycles_exitance(head, ALBEDO, SIZE, 512, seed) for seed in (1, 2)]
@@ -102,7 +104,7 @@ def test_path_tracing_of_a_lobed_body():
     total, l1 = errors(baked, (first + second) / 2, areas)
     # The mean of two runs is off by half of their difference, on average.
     noise = errors(first, second, areas)[1] / 2
-    assert (np.abs(total) < 0.02).all(), total
+    assert (np.abs(total) < 0.025).all(), total
     assert (np.sqrt(np.maximum(l1**2 - noise**2, 0)) < 0.04).all(), (l1, noise)
 
 
