@@ -79,7 +79,7 @@ def documentation(name: str) -> str:
 
 
 def manual_map() -> tuple[str, tuple[tuple[str, str], ...]]:
-    """Where F1 and *Online Manual* of a button lead: start of all URLs, and the rest of each by the button's name."""
+    """Pages that F1 and *Online Manual* open: the start of all URLs, and the rest of each by the button's name."""
     found = ((pattern, documentation(page), heading) for pattern, page, heading in MANUAL)
     return "", tuple((pattern, f"{url}#{heading}") for pattern, url, heading in found if url)
 

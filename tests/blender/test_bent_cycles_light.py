@@ -34,8 +34,8 @@ def baked_by_cycles(ball, output="IRRADIANCE"):
 
 
 def test_cycles_finds_bounced_light_on_a_ball():
-    """As test_bent_bounced.py does by our own rays: a normal at an angle b from downward sees (1 + cos b) / 2 of a
-    wide floor; the ball's shadow takes 4 % from the sides, and 1 % is noise.
+    """A normal at an angle b from downward sees (1 + cos b) / 2 of a wide floor. The ball's shadow takes 4 % from the
+    sides, and 1 % is noise. test_bent_bounced.py has the same by our own rays.
     """
     ball = add_ball()
     floor = scenes.add_plane("Floor", size=(400.0, 400.0))

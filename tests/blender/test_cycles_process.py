@@ -220,7 +220,7 @@ def test_an_orphan_ends_and_removes_all(is_stopped):
 
 @IS_POSIX
 def test_nothing_is_left_of_an_orphan_whose_folder_went_before_it_began(tmp_path):
-    """As where a window is closed right after a bake has asked for Cycles."""
+    """A window may be closed right after a bake has asked for Cycles."""
     program = [bpy.app.binary_path, "-b", "--factory-startup", "--python"] if bpy.app.binary_path else [sys.executable]
     environment = os.environ | {"TMPDIR": str(tmp_path)}
     child = subprocess.Popen([*program, str(process.CHILD), "--", "mark", "60"], stdin=subprocess.PIPE, env=environment)
@@ -312,11 +312,11 @@ def test_threads_take_turns():
 
 
 def test_a_world_s_progress_follows_the_samples_of_cycles():
-    """So that the time left is that at its speed, also on a busy machine."""
+    """The time left then follows Cycles' speed, also on a busy machine."""
     scenes.add_world()
     told = []
     with new_copy() as copy:
         process.run(copy, "world", SHORT | {"width": 512, "height": 256, "samples": 2000}, told.append)
-    between = sorted({round(fraction, 3) for fraction in told if 0 < fraction < 0.7})
-    assert between, told
+    # Cycles may tell its first sample and one number in the middle.
+    assert any(0.01 < fraction < 0.69 for fraction in told), told
     assert told == sorted(told)

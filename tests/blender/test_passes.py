@@ -231,7 +231,10 @@ def test_the_panel_shows_the_settings_that_count(settings):
     plain, expert = panels.BEAMSPREAD_PT_render, panels.BEAMSPREAD_PT_expert
     select(add_plane(material=add_material()))
     assert {"output", "use_indirect"} <= set(drawn(plain).properties)
-    assert {"solver", "distributions", "quality", "samples", "margin"} <= set(drawn(expert).properties)
+    assert {"solver", "quality", "samples", "margin"} <= set(drawn(expert).properties)
+    assert panels.BEAMSPREAD_PT_samples.poll(bpy.context)
+    assert "distributions" in drawn(panels.BEAMSPREAD_PT_samples).properties
     settings.output = "IRRADIANCE"
+    assert not panels.BEAMSPREAD_PT_samples.poll(bpy.context)
     assert {"output", "use_indirect", "samples"} <= set(drawn(plain, expert).properties)
     assert not {"solver", "distributions", "quality"} & set(drawn(plain, expert).properties)

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from beamspread import LdfSample, Medium, convolve, library, luminance, presets
+from beamspread import LdfSample, Medium, convolve, convolve_lights, library, luminance, presets
 from beamspread.core.bake.textured import beams_of
 from beamspread.core.native import native
 
@@ -87,6 +87,11 @@ def test_beams_have_all_the_light():
     for _, direction in beams:
         assert np.linalg.norm(direction) == pytest.approx(1)
         assert direction[2] < 0
+
+
+def test_no_lights_are_named():
+    with pytest.raises(ValueError, match="lights"):
+        convolve_lights([], LDF, STRIPES, 1.0, 1.0)
 
 
 @pytest.mark.parametrize(

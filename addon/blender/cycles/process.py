@@ -196,7 +196,7 @@ class _Child:
         self._process = subprocess.Popen(
             command, env=os.environ | places, encoding="utf-8", errors="replace", creationflags=hidden, **pipes
         )
-        # Where Python ends without `end`, the process goes before its folder: it would write into that meanwhile.
+        # Python may end without `end`. The process is killed before its folder goes: it would still write there.
         self._killer = weakref.finalize(self, _kill, self._process)
         self._finished = threading.Event()
         self._begin()

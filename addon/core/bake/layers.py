@@ -199,7 +199,7 @@ def _spread_group(
             progress=progress,
             report_noise=report_spread,
             report_beyond=lambda shares: report_bend and report_bend(max(shares)),
-            **({} if side == "reflected" else {"side": side}),
+            side=side,
         )
     except native.MemoryLimit as error:
         largest = max(grids, key=lambda grid: grid.texels)

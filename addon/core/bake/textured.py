@@ -58,6 +58,8 @@ def textured_luminance(
     report_noise: Callable[[float], None] | None,
 ) -> NDArray[np.float32]:
     """`convolve_lights` for a map of albedos; `convention` solves for one albedo of each channel."""
+    if not lights:
+        raise ValueError("argument 'lights' is empty; allowed: at least one light")
     if not noise > 0:
         raise ValueError(f"argument 'noise' is {noise}; allowed: numbers above 0")
     if not all(isinstance(source, native.LdfLibrary) for source in sources):

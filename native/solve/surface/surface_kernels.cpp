@@ -14,8 +14,8 @@ namespace {
 constexpr std::size_t max_bytes = std::size_t{128} << 20;
 constexpr std::size_t max_kernels = 16;
 
-// What the kernels depend on: numbers of the choice and of the LDFs. Two sources at one address, one after the other, or a
-// source and its copy with other curvatures differ in them.
+// The choice and some numbers of the LDFs. An address would not do: a new LDF may lie where a former one was, and a copy
+// with curvatures differs from its original in these numbers alone.
 using Key = std::vector<double>;
 
 Key key_of(const KernelChoice& choice)

@@ -12,7 +12,7 @@
 
 namespace beamspread {
 
-// What the kernels of a surface depend on.
+// The media and the samples that kernels of a surface are made for.
 struct KernelChoice {
     std::vector<ChannelMedium> channels;
     double max_angle_deg = 90.0;
@@ -31,7 +31,7 @@ public:
 
     explicit SurfaceKernels(const KernelChoice& choice);
 
-    // Of the media as they are, not of others at the same address: those used last are kept, in bounded memory.
+    // The kernels of a choice, made anew or kept from an earlier one. Those used last are kept, in bounded memory.
     static std::shared_ptr<SurfaceKernels> recent(const KernelChoice& choice);
 
     const SurfaceBasis& basis() const { return m_basis; }

@@ -78,7 +78,7 @@ void add_paths(SharedPaths& paths, const PathPlan& plan, std::size_t walks, Rand
     std::vector<Vec2> places;
     for (std::size_t i = 0; i < walks; ++i) {
         walk(plan, random, places);
-        // Where light leaves within its texel; also for walks that don't leave, so that all draw as many numbers.
+        // The point of its texel that light leaves. Walks that end inside draw it, too.
         const Vec2 within(random.uniform(), random.uniform());
         if (places.empty())
             continue;

@@ -16,8 +16,8 @@ using Map = std::vector<float>;
 // Standard deviations of the Gaussians that a ratio may be smoothed by, texels.
 constexpr std::array<double, 4> widths{0.0, 1.0, 2.0, 4.0};
 
-// Those that average the errors by which a width is chosen, and the borders between widths. Larger: surer choices, for
-// larger parts of a map.
+// Standard deviation of the Gaussian that averages errors before a width is chosen, and of the one that blends widths.
+// Larger: fewer wrong choices, and widths that follow the map less closely.
 constexpr double choice_width = 8.0;
 constexpr double blend_width = 2.0;
 
@@ -35,7 +35,7 @@ public:
             weight /= static_cast<float>(sum);
     }
 
-    // Beyond the border the last texel goes on.
+    // The texels at the border continue beyond it.
     Map operator()(const Map& values) const
     {
         Map across(values.size()), both(values.size());

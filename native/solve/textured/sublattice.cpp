@@ -2,15 +2,13 @@
 
 #include <algorithm>
 
-#include "solve/textured/path_products.h"
-
 namespace beamspread {
 
 namespace {
 
-// Sublattices along each axis at most, and texels of each that they leave on the longer side. More: neighbors share paths at
-// a greater distance, so that errors are finer, and more paths are drawn.
-constexpr std::size_t max_side = 8;
+// Sublattices along each axis. More: texels of the same paths, and of the same errors, are farther apart, and more paths
+// are drawn.
+constexpr std::size_t sublattices_along_axis = 8;
 
 std::ptrdiff_t floor_div(std::ptrdiff_t value, std::ptrdiff_t divisor)
 {
@@ -19,20 +17,18 @@ std::ptrdiff_t floor_div(std::ptrdiff_t value, std::ptrdiff_t divisor)
 
 }  // namespace
 
-const std::size_t Sublattices::run_length = texels_per_run;
-
 Sublattices::Sublattices(std::size_t width, std::size_t height, std::size_t reach)
-    : m_width(width), m_height(height), m_side(max_side)
+    : m_width(width), m_height(height), m_side(sublattices_along_axis)
 {
     m_rows = (height + m_side - 1) / m_side;
-    m_runs = ((width + m_side - 1) / m_side + run_length - 1) / run_length;
+    m_runs = ((width + m_side - 1) / m_side + texels_per_run - 1) / texels_per_run;
     m_reach = std::min(reach, std::max(width, height));
     m_border = (m_reach + m_side - 1) / m_side + 1;
 }
 
 std::size_t Sublattices::run(std::size_t row, std::size_t number) const
 {
-    return (row + m_border) * (m_runs * run_length + 2 * m_border) + m_border + number * run_length;
+    return (row + m_border) * (m_runs * texels_per_run + 2 * m_border) + m_border + number * texels_per_run;
 }
 
 bool Sublattices::is_within(const PathPlace& place) const
@@ -48,14 +44,14 @@ std::ptrdiff_t Sublattices::offset(std::size_t sublattice, const PathPlace& plac
     const std::ptrdiff_t x = static_cast<std::ptrdiff_t>(sublattice % m_side) + std::clamp(place.x, -reach, reach);
     const std::ptrdiff_t y = static_cast<std::ptrdiff_t>(sublattice / m_side) + std::clamp(place.y, -reach, reach);
     const std::ptrdiff_t across = floor_div(x, side), up = floor_div(y, side);
-    const auto stride = static_cast<std::ptrdiff_t>(m_runs * run_length + 2 * m_border);
+    const auto stride = static_cast<std::ptrdiff_t>(m_runs * texels_per_run + 2 * m_border);
     const auto plane = stride * static_cast<std::ptrdiff_t>(m_rows + 2 * m_border);
     return ((y - up * side) * side + x - across * side) * plane + up * stride + across;
 }
 
 AlignedVector<float> Sublattices::dealt(const View2D<const float>& values, float factor, bool goes_on) const
 {
-    const std::size_t stride = m_runs * run_length + 2 * m_border, rows = m_rows + 2 * m_border;
+    const std::size_t stride = m_runs * texels_per_run + 2 * m_border, rows = m_rows + 2 * m_border;
     AlignedVector<float> plane(count() * rows * stride);
     const auto side = static_cast<std::ptrdiff_t>(m_side), border = static_cast<std::ptrdiff_t>(m_border);
     const auto width = static_cast<std::ptrdiff_t>(m_width), height = static_cast<std::ptrdiff_t>(m_height);

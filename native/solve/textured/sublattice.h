@@ -6,6 +6,7 @@
 
 #include "base/threads.h"
 #include "base/view.h"
+#include "solve/textured/path_products.h"
 #include "solve/textured/shared_paths.h"
 
 namespace beamspread {
@@ -25,11 +26,11 @@ public:
     // Index in a plane of the first texel of a run of a sublattice.
     std::size_t run(std::size_t row, std::size_t number) const;
 
-    // What to add to the index of a run, for a place of texels of this sublattice.
+    // The index of a place, less that of the run of texels that light leaves, which are of this sublattice.
     std::ptrdiff_t offset(std::size_t sublattice, const PathPlace& place) const;
     bool is_within(const PathPlace& place) const;
 
-    // A plane of these sublattices. Beyond the border values go on, or they are 0.
+    // A plane of these sublattices. Beyond the border values continue, or they are 0.
     AlignedVector<float> dealt(const View2D<const float>& values, float factor, bool goes_on) const;
 
     // Calls set(y, x, index in a plane without borders of this sublattice) for each texel.
@@ -38,17 +39,15 @@ public:
     {
         for (std::size_t row = 0; row < m_rows; ++row) {
             const std::size_t y = row * m_side + sublattice / m_side;
-            for (std::size_t column = 0; y < m_height && column < m_runs * run_length; ++column) {
+            for (std::size_t column = 0; y < m_height && column < m_runs * texels_per_run; ++column) {
                 const std::size_t x = column * m_side + sublattice % m_side;
                 if (x < m_width)
-                    set(y, x, row * m_runs * run_length + column);
+                    set(y, x, row * m_runs * texels_per_run + column);
             }
         }
     }
 
 private:
-    static const std::size_t run_length;
-
     std::size_t m_width;
     std::size_t m_height;
     std::size_t m_side;  // sublattices along each axis
