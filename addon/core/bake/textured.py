@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..arrays import float_array
-from ..ldf.albedo import MAX_ALBEDO
+from ..ldf.reflectance_table import ReflectanceTable, reflectance_table
 from ..native import native
 from ..progress import Progress
 
@@ -21,9 +21,6 @@ MAX_WALKS = 4096
 
 LEAST_FACTOR = 0.1
 """Smallest factor by which the convention multiplies light. Smaller: the ratio to the truth has more noise in black."""
-
-NODES = 512
-"""Albedos at which the reflectance of a medium is known; in between it is linear in the root of 1 - albedo."""
 
 NARROW = 2.0
 """Directions within this many degrees count as one. Larger: fewer paths, and light that goes another way."""
@@ -71,7 +68,7 @@ def textured_luminance(
     shape = lights[0][0].shape
     albedos = checked_map(albedo, shape)
     solving, correcting = progress.split([SOLVER_PART, 1 - SOLVER_PART])
-    channels = [TexturedMedium.of(source, albedos[..., c]) for c, source in enumerate(sources)]
+    channels = [TexturedMedium.of(reflectance_table(source), albedos[..., c]) for c, source in enumerate(sources)]
     factors = np.stack([channel.factor for channel in channels], -1)
     entering = [(np.ascontiguousarray(light * factors), way) for light, way in lights]
     result = convention(entering, [channel.albedo for channel in channels], solving) * factors
@@ -135,16 +132,13 @@ class TexturedMedium:
     is_even: bool
 
     @classmethod
-    def of(cls, library: native.LdfLibrary, albedo: NDArray[np.float32]) -> TexturedMedium:
+    def of(cls, table: ReflectanceTable, albedo: NDArray[np.float32]) -> TexturedMedium:
         if (albedo == albedo.flat[0]).all():
             return cls(float(albedo.flat[0]), np.ones_like(albedo), True)
-        roots = np.linspace(np.sqrt(1 - MAX_ALBEDO), 1, NODES)
-        known = np.array([library.diffuse_reflectance(1 - root**2) for root in roots])
-        reflectance = np.interp(np.sqrt(1 - albedo.astype(float)), roots, known)
+        reflectance = table.reflectance(albedo)
         mean = reflectance.mean()
         factor = np.sqrt(np.maximum(reflectance / mean, LEAST_FACTOR**2))
-        root = np.interp(-mean, -known, roots)
-        return cls(float(1 - root**2), factor.astype(np.float32), False)
+        return cls(float(table.albedo(mean)), factor.astype(np.float32), False)
 
 
 def beams_of(lights: Lights) -> list[tuple[NDArray[np.float32], NDArray[np.float64]]]:

@@ -1,0 +1,48 @@
+"""Reflectance of a medium for whole maps of albedos, and the reverse."""
+
+from __future__ import annotations
+
+from functools import lru_cache
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from ..native import native
+from .albedo import MAX_ALBEDO
+
+NODES = 32
+"""Albedos at which the library is asked. Fewer: larger errors where hardly any light returns."""
+
+STEPS = 2048
+"""Points of the table, between which it is linear in the root of 1 - albedo. More: smaller errors."""
+
+
+class ReflectanceTable:
+    """Reflectance under uniform diffuse light for each albedo from 0 to `MAX_ALBEDO`.
+
+    The reflectance is smooth in sqrt(1 - albedo), van de Hulst's similarity parameter: a polynomial through a few nodes
+    is it within 3e-5 (Chebyshev's nodes).
+    """
+
+    def __init__(self, library: native.LdfLibrary) -> None:
+        ends = [(1 - MAX_ALBEDO) ** 0.5, 1.0]
+        at_roots = np.vectorize(lambda root: library.diffuse_reflectance(1 - root**2))
+        known = np.polynomial.Chebyshev.interpolate(at_roots, NODES - 1, domain=ends)
+        self._roots = np.linspace(*ends, STEPS)
+        # Rounding may leave the darkest end below 0.
+        self._reflectances = np.maximum(np.minimum.accumulate(known(self._roots)), 0.0)
+
+    def reflectance(self, albedo: ArrayLike) -> NDArray[np.float64]:
+        """Reflectance of albedos, any shape."""
+        return np.interp(np.sqrt(1 - np.asarray(albedo, float)), self._roots, self._reflectances)
+
+    def albedo(self, reflectance: ArrayLike) -> NDArray[np.float64]:
+        """Albedos of reflectances, any shape; 0 and `MAX_ALBEDO` where no albedo has them."""
+        roots = np.interp(-np.asarray(reflectance, float), -self._reflectances, self._roots)
+        return 1 - roots**2
+
+
+@lru_cache(maxsize=4)
+def reflectance_table(library: native.LdfLibrary) -> ReflectanceTable:
+    """The table of a library; those used last are kept."""
+    return ReflectanceTable(library)
