@@ -24,7 +24,7 @@ using Texels = float __attribute__((vector_size(lanes * sizeof(float))));
     std::memcpy(texels.data(), values, sizeof(texels));
 }
 
-void add_path_products(const PlacedPaths& paths, const float* light, const float* plain_light, const float* albedo,
+void add_path_products(const PlacedPaths& paths, const float* light, const float* entering, const float* albedo,
                        float* textured, float* plain)
 {
     std::array<Texels, vectors> sum, plain_sum;
@@ -34,10 +34,10 @@ void add_path_products(const PlacedPaths& paths, const float* light, const float
         const std::ptrdiff_t* place = paths.places.data() + paths.first[p];
         const std::ptrdiff_t* const end = paths.places.data() + paths.first[p + 1];
         std::array<Texels, vectors> product, factor;
-        load(plain_light + *place, factor);
-        for (std::size_t v = 0; v < vectors; ++v)
-            plain_sum[v] += paths.weight[p] * factor[v];
         load(light + *place, product);
+        load(entering + *place, factor);
+        for (std::size_t v = 0; v < vectors; ++v)
+            plain_sum[v] += paths.weight[p] * (product[v] * factor[v]);
         while (++place < end) {
             load(albedo + *place, factor);
             for (std::size_t v = 0; v < vectors; ++v)
@@ -59,10 +59,10 @@ namespace beamspread {
 
 HWY_EXPORT(add_path_products);
 
-void add_path_products(const PlacedPaths& paths, const float* light, const float* plain_light, const float* albedo,
+void add_path_products(const PlacedPaths& paths, const float* light, const float* entering, const float* albedo,
                        float* textured, float* plain)
 {
-    HWY_DYNAMIC_DISPATCH(add_path_products)(paths, light, plain_light, albedo, textured, plain);
+    HWY_DYNAMIC_DISPATCH(add_path_products)(paths, light, entering, albedo, textured, plain);
 }
 
 }  // namespace beamspread

@@ -20,8 +20,8 @@ struct PlacedPaths {
 
 // For a run of texels from `at` on, over all paths:
 //   textured[i] += light[entry + i] * product of the albedos at the scatterings
-//   plain[i] += weight * plain_light[entry + i]
-void add_path_products(const PlacedPaths& paths, const float* light, const float* plain_light, const float* albedo,
+//   plain[i] += weight * light[entry + i] * entering[entry + i]
+void add_path_products(const PlacedPaths& paths, const float* light, const float* entering, const float* albedo,
                        float* textured, float* plain);
 
 }  // namespace beamspread

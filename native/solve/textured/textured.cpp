@@ -19,8 +19,11 @@ namespace beamspread {
 
 namespace {
 
-// Walks for each texel of the first round, which shows the noise, and the most of a round relative to all before.
-constexpr std::size_t first_walks = 128;
+// Walks for each texel come in units, which lights share. Larger: shares are finer, and more walks than wanted.
+constexpr std::size_t unit = 32;
+
+// Units of the first round, which shows the noise, and the most of a round relative to all before.
+constexpr std::size_t first_units = 4;
 constexpr std::size_t max_growth = 7;
 
 // Farthest place from an exit, in texels, that fewer paths than this fraction pass; they count as at that distance.
@@ -43,6 +46,28 @@ float largest(const View2D<const float>& values)
         for (std::size_t x = 0; x < values.width; ++x)
             most = std::max(most, values(y, x));
     return most;
+}
+
+double root_mean_square(const View2D<const float>& values)
+{
+    double sum = 0.0;
+    for (std::size_t y = 0; y < values.height; ++y)
+        for (std::size_t x = 0; x < values.width; ++x)
+            sum += static_cast<double>(values(y, x)) * values(y, x);
+    return std::sqrt(sum / static_cast<double>(values.height * values.width));
+}
+
+// Pairs of walks of each light in a unit: as the root of its power, since most lights matter where others do not.
+std::vector<std::size_t> shares_of(const std::vector<TexturedLight>& lights)
+{
+    std::vector<double> shares;
+    double sum = 0.0;
+    for (const TexturedLight& light : lights)
+        sum += shares.emplace_back(std::sqrt(root_mean_square(light.irradiance)));
+    std::vector<std::size_t> pairs;
+    for (const double share : shares)
+        pairs.push_back(static_cast<std::size_t>(std::max(std::round(unit / 2 * share / sum), 1.0)));
+    return pairs;
 }
 
 // Distance that all but a few paths stay within, texels.
@@ -74,18 +99,16 @@ public:
           m_survival(std::clamp(std::pow(static_cast<double>(largest(problem.albedo)), survival_power),
                                 problem.mean_albedo, max_survival)),
           m_plans(plans_of(problem, m_survival)),
+          m_pairs(shares_of(problem.lights)),
           m_sublattices(problem.albedo.width, problem.albedo.height, reach_of(m_plans, problem.seed)),
-          m_albedo(m_sublattices.dealt(problem.albedo, static_cast<float>(1.0 / m_survival), true))
+          m_albedo(m_sublattices.dealt(problem.albedo, static_cast<float>(1.0 / m_survival), true)),
+          m_entering(m_sublattices.dealt(problem.factor, 1.0f, false))
     {
-        for (const TexturedLight& light : problem.lights) {
-            m_light.push_back(m_sublattices.dealt(light.irradiance, 1.0f, false));
-            std::vector<float> entering(texels());
-            for (std::size_t y = 0; y < problem.albedo.height; ++y)
-                for (std::size_t x = 0; x < problem.albedo.width; ++x)
-                    entering[y * problem.albedo.width + x] = light.irradiance(y, x) * problem.factor(y, x);
-            const View2D<const float> view{entering.data(), problem.albedo.height, problem.albedo.width,
-                                           static_cast<std::ptrdiff_t>(problem.albedo.width)};
-            m_plain_light.push_back(m_sublattices.dealt(view, 1.0f, false));
+        for (std::size_t i = 0; i < problem.lights.size(); ++i) {
+            const TexturedLight& light = problem.lights[i];
+            // Light of fewer walks counts more.
+            const float factor = static_cast<float>(unit / 2) / static_cast<float>(m_pairs[i]);
+            m_light.push_back(m_sublattices.dealt(light.irradiance, factor, false));
         }
         for (std::size_t h = 0; h < 2; ++h) {
             m_sums.textured[h].resize(texels());
@@ -95,8 +118,8 @@ public:
 
     std::size_t texels() const { return m_problem.albedo.width * m_problem.albedo.height; }
 
-    // Adds the paths of this many walks for each texel, half of them to each half.
-    void add(std::size_t walks, const std::function<void(double)>& advance)
+    // Adds the paths of units of walks for each texel, half of them to each half.
+    void add(std::size_t units, const std::function<void(double)>& advance)
     {
         ++m_rounds;
         std::atomic<std::size_t> places{0};
@@ -107,7 +130,7 @@ public:
             for (std::size_t i = 0; i < m_plans.size(); ++i) {
                 Random random(m_problem.seed + m_rounds, path_stream, task * m_plans.size() + i);
                 SharedPaths paths;
-                add_paths(paths, m_plans[i], walks / 2, random);
+                add_paths(paths, m_plans[i], units * m_pairs[i], random);
                 places += paths.places.size();
                 add_products(paths, sublattice, i, textured.data(), plain.data());
             }
@@ -165,8 +188,8 @@ private:
             for (std::size_t number = 0; number < m_sublattices.runs(); ++number) {
                 const std::size_t at = m_sublattices.run(row, number);
                 const std::size_t to = (row * m_sublattices.runs() + number) * texels_per_run;
-                add_path_products(placed, m_light[light].data() + at, m_plain_light[light].data() + at,
-                                  m_albedo.data() + at, textured + to, plain + to);
+                add_path_products(placed, m_light[light].data() + at, m_entering.data() + at, m_albedo.data() + at,
+                                  textured + to, plain + to);
             }
         }
     }
@@ -174,10 +197,11 @@ private:
     const TexturedProblem& m_problem;
     double m_survival;
     std::vector<PathPlan> m_plans;
+    std::vector<std::size_t> m_pairs;  // of walks of each light in a unit
     Sublattices m_sublattices;
     AlignedVector<float> m_albedo;
+    AlignedVector<float> m_entering;  // the convention's factor of light that enters
     std::vector<AlignedVector<float>> m_light;
-    std::vector<AlignedVector<float>> m_plain_light;
     PathSums m_sums;
     std::uint64_t m_rounds = 0;
     double m_products = 0.0;
@@ -215,24 +239,24 @@ TexturedError solve_textured(const TexturedProblem& problem, Progress& progress,
     std::vector<float> ratio;
     with_threads(problem.threads, [&] {
         Textured textured(problem);
-        std::size_t count = std::min(first_walks, problem.max_walks);
+        std::size_t units = std::clamp<std::size_t>(problem.max_walks / unit, 1, first_units);
         double left = 1.0;
         while (true) {
             // How many rounds follow is not known: each takes half of what is left.
             const double share = left / 2.0;
             left -= share;
-            textured.add(count, [&](double part) { progress.advance(share * part); });
-            result.walks += count;
+            textured.add(units, [&](double part) { progress.advance(share * part); });
+            result.walks += units * unit;
             result.error = textured.ratio(ratio);
-            const double wanted = static_cast<double>(result.walks) * std::pow(result.error / problem.tolerance, 2);
-            const double affordable =
-                std::min(static_cast<double>(problem.max_walks),
-                         problem.max_products / std::max(textured.products(), 1.0) * static_cast<double>(result.walks));
-            const double more = std::min(wanted, affordable) - static_cast<double>(result.walks);
-            if (more < 2.0)
+            const auto walks = static_cast<double>(result.walks);
+            const double wanted = walks * std::pow(result.error / problem.tolerance, 2);
+            const double affordable = std::min(static_cast<double>(problem.max_walks),
+                                               problem.max_products / std::max(textured.products(), 1.0) * walks);
+            const double more =
+                (wanted < affordable ? std::ceil((wanted - walks) / unit) : std::floor((affordable - walks) / unit));
+            if (more < 1.0)
                 break;
-            count = std::min(static_cast<std::size_t>(more), max_growth * result.walks);
-            count -= count % 2;
+            units = std::min(static_cast<std::size_t>(more), max_growth * (result.walks / unit));
         }
     });
     progress.finish();
