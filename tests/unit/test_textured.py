@@ -1,5 +1,9 @@
 """`convolve` with an albedo of each texel."""
 
+import subprocess
+import sys
+from pathlib import Path
+
 import numpy as np
 import pytest
 from beamspread import LdfSample, Medium, convolve, convolve_lights, library, luminance, presets
@@ -111,3 +115,23 @@ def test_bad_input_is_named(arguments, name):
     arguments = {"ldf": LDF, **arguments}
     with pytest.raises(ValueError, match=name):
         convolve(LIGHT, DOWN, arguments.pop("ldf"), arguments.pop("albedo"), 1.0, 1.0, **arguments)
+
+
+def test_lights_share_the_walks():
+    """Eight lights of one direction have the noise of one, in as many walks."""
+    factor, even = np.ones((48, 40), np.float32), convolve(LIGHT, DOWN, LDF, 0.9, 1.0, 1.0)[..., 0]
+
+    def error(parts):
+        lights = [(np.full((48, 40), 1 / parts, np.float32), DOWN)] * parts
+        arguments = LDF.medium, (1.0, 1.0), np.float32(STRIPES), factor, 0.9, np.ascontiguousarray(even)
+        _, found, walks = native.textured(*arguments, lights, "reflected", 1e-6, 512)
+        assert walks == 512
+        return found
+
+    assert 0.6 < error(8) / error(1) < 1.6
+
+
+def test_the_bench_runs_in_small():
+    bench = Path(__file__).resolve().parents[1] / "bench" / "textured.py"
+    done = subprocess.run([sys.executable, str(bench), "32"], capture_output=True, text=True, check=True)
+    assert len(done.stdout.splitlines()) == 4
