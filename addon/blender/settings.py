@@ -43,8 +43,8 @@ class BeamspreadSettings(bpy.types.PropertyGroup):
     )
     texel_density: FloatProperty(
         name="Texel Density",
-        description="Set the pixels per meter of new images, whose longer side has 512 to 2048 pixels, and up to 4096 "
-        "where the spread of light needs them",
+        description="Set the pixels per meter of new images, whose longer side has 512 to 2048 pixels. The spread "
+        "of light may ask for up to 4096; bent surfaces on which it is smooth get fewer",
         default=512.0,
         min=0.01,
         soft_min=16.0,
@@ -236,12 +236,12 @@ class BeamspreadSettings(bpy.types.PropertyGroup):
         default=False,
     )
 
-    def side_for(self, length: float, surface: Surface, is_textured: bool) -> int:
+    def side_for(self, length: float, surface: Surface, is_textured: bool, is_bent: bool = False) -> int:
         """Pixels along the longer side of a new image; arguments as of `spread.side_for`."""
         if not self.use_size:
             return self.resolution
         density = self.texel_density * self.id_data.unit_settings.scale_length
-        return side_for(length, surface, density, is_textured)
+        return side_for(length, surface, density, is_textured, is_bent)
 
     def for_bake(
         self, solver: str | None = None, output: str | None = None, indirect: bool | None = None

@@ -214,6 +214,36 @@ def test_facts_without_meshes_tell_what_a_bake_reads(scene):
     assert 1 / factor < seconds_of(ours) / seconds_of(read) < factor
 
 
+def bend(shape, **properties):
+    """A cube or a UV sphere of a gray medium under a lamp, with a new image by its size."""
+    bpy.context.scene.beamspread.property_unset("resolution")
+    add_lamp((2, 1, 3), radius=0.1)
+    getattr(bpy.ops.mesh, f"primitive_{shape}_add")()
+    one, values = bpy.context.object, {"color_mode": "BASE_COLOR", "base_color": (0.8,) * 3, "ior": 1.4}
+    one.data.materials.append(add_material("Gray", **values | properties))
+    return one
+
+
+@pytest.mark.parametrize("shape", ["cube", "uv_sphere"])
+def test_bent_meshes_are_announced_by_their_faces(shape):
+    """Their texels are those that show a face, and pieces of long ones, as at a sphere's poles."""
+    one = bend(shape)
+    ours, (read,), (target,) = announced(one), forecasts(), find_targets([one])
+    assert [step.kind for step in state.announced[target].steps] == [step.kind for step in read]
+    assert 1 / 1.15 < ours / seconds_of(read) < 1.15
+    assert state.announced[target].spread.side == 512  # whose light is smooth over 5 cm
+
+
+def test_faces_that_modifiers_make_are_announced():
+    one = bend("cube")
+    edges = bpy.data.meshes.new("Profile")
+    edges.from_pydata([(1, 0, -1), (1, 0, 1)], [(0, 1)], [])
+    edges.materials.append(one.data.materials[0])
+    one.data = edges
+    one.modifiers.new("Screw", "SCREW")
+    assert announced(one) > 0.1
+
+
 def test_forecasts_know_who_finds_light():
     bpy.context.scene.beamspread.use_indirect = True
     glass()

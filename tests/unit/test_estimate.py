@@ -1,15 +1,17 @@
 """Estimates of the seconds that bakes take: what they grow with, and their correction by measured times."""
 
+import math
 from dataclasses import replace
 
 import pytest
 from beamspread import Medium
 from beamspread.core.bake import steps
-from beamspread.core.bake.estimate import Workload, bounced_seconds, simulation_seconds
+from beamspread.core.bake.estimate import Workload, bounced_seconds, channels_of, simulation_seconds
 from beamspread.core.bake.forecast import Finders, Forecast, seconds_of, steps_of_bakes
 from beamspread.core.bake.layers import MIN_RAYS
 from beamspread.core.bake.pace import Estimate, Pace, pace
 from beamspread.core.bake.surface import Surface
+from beamspread.core.ldf.library import angles_for
 from beamspread.core.scene.lights import AreaLight, PointLight, SunLight
 
 from bakes import MATERIAL, SETTINGS, bake_job, square
@@ -175,9 +177,35 @@ def test_estimates_have_a_subject():
     assert Estimate("Baking", "Plane", 2.0).corrected() == pytest.approx(6.0)
 
 
-def test_bodies_take_longer_the_farther_their_light_spreads():
-    """CPU seconds in blend_examples: 20 for the worn soap of 257,000 texels and a path of 7, 14 with faster tables."""
-    load = Workload(texels=257_000, is_bent=True, path=7.0)
+@pytest.mark.parametrize(
+    ("texels", "pieces", "channels", "lit", "path", "cpu"),
+    [
+        (98_000, 1.0, 1, 1.0, 0.64, 5.9),  # the default cube at 512 x 512, under its lamp and world
+        (45_000, 1.95, 1, 1.0, 2.08, 7.6),  # a UV sphere, whose texels are long at its poles
+        (45_000, 1.95, 3, 1.0, 8.3, 16.0),  # the same of three media
+        (257_000, 1.0, 3, 0.5, 7.0, 20.0),  # the worn soap of blend_examples
+    ],
+)
+def test_bodies_take_longer_the_farther_their_light_spreads(texels, pieces, channels, lit, path, cpu):
+    """CPU seconds of whole bakes in Blender 3.4, a second or two of which are rays."""
+    load = Workload(texels, is_bent=True, pieces=pieces, channels=channels, lit=lit, path=path)
     one_thread = replace(SETTINGS, threads=1)
-    assert 20 / 1.7 < load.seconds(one_thread) < 20 * 1.7
+    assert cpu / 1.7 < load.seconds(one_thread) < cpu * 1.7
     assert replace(load, path=0.1).seconds(one_thread) < 0.5 * load.seconds(one_thread)
+
+
+def test_channels_of_one_medium_share_their_light_under_one_color():
+    red = replace(SUN, color=(1.0, 0.5, 0.5))
+    gray = Surface(replace(MATERIAL, mean_free_path=(1e-3,) * 3, albedo=(0.9,) * 3))
+    assert channels_of(gray, [SUN, POINT]) == channels_of(gray, [red]) == 1
+    assert channels_of(gray, [SUN, red]) == 3
+    assert channels_of(Surface(replace(gray.material, albedo=(0.9, 0.9, 0.5))), [SUN]) == 2
+
+
+def test_simulations_of_slabs_take_as_long_as_measured():
+    """CPU seconds for each angle at g .8 and ior 1.4, by `simulate` with the photons of final quality."""
+    one_thread = replace(FINAL, threads=1)
+    for thickness, seconds in ((1.0, 0.86), (5.0, 0.86), (20.0, 1.87), (math.inf, 5.95)):
+        medium = Medium(0.8, 1.4, thickness)
+        estimate = simulation_seconds([medium], one_thread) / len(angles_for(medium))
+        assert seconds / 1.7 < estimate < seconds * 1.7

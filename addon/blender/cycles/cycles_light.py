@@ -151,7 +151,8 @@ class CyclesLight:
         """True if light may bounce to the receiver: something that renders, or a part of itself, is above it."""
         for grid in grids:
             if isinstance(grid, BentGrid):
-                low, high = grid.corners()[[0, -1]] + 1e-5 * grid.size * np.array([[-1], [1]])
+                # The receiver's own corners lie beyond the middles of its texels.
+                low, high = grid.corners()[[0, -1]] + (1e-5 * grid.size + grid.reach) * np.array([[-1], [1]])
                 if ((self._corners < low) | (self._corners > high)).any() or grid.is_hollow():
                     return True
                 continue

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterable, Sequence
 from dataclasses import replace
 
@@ -13,24 +12,22 @@ from ...core.bake.bake_settings import COMBINED, FINAL, PREVIEW, BakeSettings
 from ...core.bake.estimate import OF_MESHES, OF_WORLD
 from ...core.bake.forecast import Finders, Forecast, seconds_of
 from ...core.bake.pace import Estimate
-from ...core.bake.spread import Spread, image_length, spread_over_edges
-from ...core.errors import BakeError, MaterialError, ReceiverError
-from ...core.scene.flat_mesh import NO_FACES, bends
+from ...core.bake.spread import Spread
+from ...core.errors import MaterialError
 from ...core.scene.lights import Light, WorldLight
 from ...core.scene.receiver import Grid
-from ...core.target import FRONT, Target
+from ...core.target import Target
 from ...core.time_left import duration
 from .. import compat
-from ..images.facts import is_sequence
 from ..node.draw import bent_materials
-from ..node.find import BakeTarget, targets_of, uses_tiles
-from ..read.geometry import mesh_key, read_polygons
+from ..node.find import BakeTarget, targets_of
 from ..read.lamps import fault, is_portal, read_lamp
 from ..read.lights import lights_surfaces
 from ..read.node_kinds import NodeKinds, all_known, kinds_of
 from ..read.scene_cache import scene_cache
 from ..read.visibility import SURFACE_TYPES, by_name, placed, render_visible_names
 from .state import Announced, state
+from .target_shape import Shape, grid_of, grid_of_bent, shape_of
 
 PLACEHOLDER_COLOR = (0.5, 0.5, 0.5)
 
@@ -43,18 +40,11 @@ LOW = 1e-4
 # Fraction of a receiver that an object has to reach over for it to be enclosed.
 ENCLOSED = 0.9
 
-# Number of faces of a mesh up to which their areas are read. More slow the scans of a scene down.
-MAX_FACES = 100_000
-
 # Number of lines about the spread of light in a panel.
 MAX_LINES = 4
 
 # Shortest simulation that a line names, seconds.
 MIN_SIMULATION = 1.0
-
-
-NO_SHAPE = 0.0, False, None
-"""Shape of a target about which nothing is known."""
 
 
 def announce(context, targets: list[Target]) -> dict[Target, Announced]:
@@ -70,15 +60,15 @@ def announce(context, targets: list[Target]) -> dict[Target, Announced]:
     state.refused.clear()
     for target in targets:
         bakes = [item for item in targets_of(objects[target.object_name]) if item.name == target]
-        length, is_bent, error = _shape(bakes[0], depsgraph) if bakes and _is_valid(bakes[0]) else NO_SHAPE
-        if error is not None:
-            state.refused[target] = error
-        bent_materials.update([target.material_name] if is_bent else [])
-        forecast = facts.forecast(bakes[0], _side(bakes[0], length, scene), is_bent) if length else None
+        shape = shape_of(bakes[0], depsgraph) if bakes and _is_valid(bakes[0]) else Shape()
+        if shape.error is not None:
+            state.refused[target] = shape.error
+        bent_materials.update([target.material_name] if shape.is_bent else [])
+        grid = grid_of(bakes[0], _side(bakes[0], shape, scene)) if shape.length else None
+        forecast = None if grid is None else facts.forecast(bakes[0], grid, shape)
         if forecast is not None:
-            bake = _announced(target, forecast, settings, facts.encloses(forecast.grids[0]))
-            (grid,) = forecast.grids
-            spread = Spread.of(length, forecast.surface, (grid.width, grid.height))
+            bake = _announced(target, forecast, settings, facts.encloses(grid))
+            spread = Spread.of(shape.length, forecast.surface, (grid.width, grid.height))
             announced[target] = replace(bake, spread=spread if settings.layer == COMBINED else None)
     return announced
 
@@ -158,21 +148,31 @@ class _SceneFacts:
         covered = np.prod(np.maximum(shared, 0) / size, axis=1)
         return bool((covered[high[:, 2] > LOW * size.max()] > ENCLOSED).any())
 
+    def _is_beside(self, obj) -> bool:
+        """True if an object reaches beyond the box around this one."""
+        corners = np.array(obj.bound_box) @ np.array(obj.matrix_world)[:3, :3].T + np.array(obj.matrix_world)[:3, 3]
+        low, high = corners.min(axis=0), corners.max(axis=0)
+        halves, edge = np.abs(self._halves).sum(axis=2), LOW * np.ptp(corners, axis=0).max()
+        return bool(((self._centers - halves < low - edge) | (self._centers + halves > high + edge)).any())
+
     def _extents(self, grid: Grid) -> tuple[np.ndarray, np.ndarray]:
         """Lowest and highest coordinates (N, 3) of all boxes in a grid's frame, from its center."""
         axes = np.array((grid.x_axis, grid.y_axis, grid.normal))
         centers, halves = (self._centers - grid.centre) @ axes.T, np.abs(axes @ self._halves).sum(axis=2)
         return centers - halves, centers + halves
 
-    def forecast(self, target: BakeTarget, resolution: int, is_bent: bool) -> Forecast | None:
-        """The forecast for a target; None if it has no faces or no size."""
-        grid, obj = _grid(target, resolution), target.obj
-        if grid is None or not (self.lights or self.unknown or self.world_by_cycles or self.lamps_by_cycles):
+    def forecast(self, target: BakeTarget, grid: Grid, shape: Shape) -> Forecast | None:
+        """The forecast for a target on about this grid; None if the scene has no light."""
+        obj = target.obj
+        if not (self.lights or self.unknown or self.world_by_cycles or self.lamps_by_cycles):
             return None
         surface = target.node.surface()
-        low, high = self._extents(grid)
-        reach = max(high[:, 2].max(), -low[:, 2].min() * (surface.thickness > 0))
-        is_below = reach > LOW * max(obj.dimensions)
+        if shape.is_bent:
+            is_below = shape.is_hollow or self._is_beside(obj)
+        else:
+            low, high = self._extents(grid)
+            reach = max(high[:, 2].max(), -low[:, 2].min() * (surface.thickness > 0))
+            is_below = reach > LOW * max(obj.dimensions)
         is_textured = target.node.has_texture()
         finders = Finders(
             bounced=is_below,
@@ -182,7 +182,9 @@ class _SceneFacts:
             colors=is_textured and not all_known(target.node.color_input(target.groups)),
         )
         surface = replace(surface, base_color=PLACEHOLDER_COLOR) if is_textured else surface
-        return Forecast(obj.name, [grid], self.lights, self.triangles, surface, finders, self.unknown, is_bent)
+        rest = finders, self.unknown, shape.is_bent, shape.pieces
+        grids = [grid_of_bent(grid, shape) if shape.is_bent else grid]
+        return Forecast(obj.name, grids, self.lights, self.triangles, surface, *rest)
 
 
 def _kinds(owner) -> NodeKinds:
@@ -198,75 +200,10 @@ def _is_valid(target: BakeTarget) -> bool:
     return True
 
 
-def _side(target: BakeTarget, length: float, scene) -> int:
+def _side(target: BakeTarget, shape: Shape, scene) -> int:
     """Texels along the longer side of a new image for a target, about."""
-    return scene.beamspread.side_for(length, target.node.surface(), target.node.has_texture())
-
-
-def _shape(target: BakeTarget, depsgraph) -> tuple[float, bool, BakeError | None]:
-    """Length of an image's side on the surface, scene units, 0 for a surface without area; True if the surface bends;
-    the reason why it can't be baked, if that is known.
-
-    Where a mesh is large, the length is that of the box around its object, and it counts as bent.
-    """
-    obj, matrix = target.obj, target.obj.matrix_world
-    if len(obj.data.polygons) > MAX_FACES:
-        return max(obj.dimensions), True, None
-    evaluated, node = obj.evaluated_get(depsgraph), target.node
-    is_tiled = uses_tiles(node, target.side)
-
-    surface = node.surface()
-    try:
-        surface.check()
-    except BakeError:
-        return NO_SHAPE  # `problems` says why
-    path, spread = min(surface.material.mean_free_path), spread_over_edges(surface)
-
-    def read() -> tuple[float, bool, BakeError | None]:
-        try:
-            polygons = read_polygons(evaluated, target.material.name, None, node.uv_map, is_tiled)
-            if not polygons.count:
-                raise ReceiverError(*NO_FACES)
-            length = image_length([polygons])
-            is_bent = 0 < length < math.inf and bends(polygons, path, spread)
-        except BakeError as error:
-            return 0.0, False, error
-        return (length, is_bent, None) if math.isfinite(length) else NO_SHAPE
-
-    state = mesh_key(evaluated), node.uv_map, is_tiled, path, spread, *(tuple(row) for row in matrix)
-    return scene_cache.get(("shape of image", obj, target.material.name), [obj], read, state=state)
-
-
-def _grid(target: BakeTarget, resolution: int) -> Grid | None:
-    """About the grid of a target: as if the texture covered the object's largest two sides."""
-    obj, image = target.obj, target.image
-    if not len(obj.data.polygons) or is_sequence(image):
-        return None
-    matrix, face = obj.matrix_world, obj.data.polygons[0]
-    normal = matrix.to_3x3().inverted_safe().transposed() @ face.normal
-    x_axis = matrix.to_3x3().col[0] if abs(face.normal.x) < 0.9 else matrix.to_3x3().col[1]
-    if not normal.length or not x_axis.length:
-        return None
-    normal.normalize()
-    x_axis = (x_axis - x_axis.dot(normal) * normal).normalized()
-    y_axis = normal.cross(x_axis)
-    corners = np.array(obj.bound_box) @ np.array(matrix)[:3, :3].T + np.array(matrix)[:3, 3]
-    along = corners @ np.array([x_axis, y_axis]).T
-    sides = np.ptp(along, axis=0)
-    if not sides.all():
-        return None
-    size = np.maximum(np.rint(resolution * sides / sides.max()), 1) if image is None else np.array(image.size)
-    if not size.all():
-        return None
-    if (size[0] < size[1]) != (sides[0] < sides[1]):
-        size = size[::-1]
-    columns, rows = map(int, size)
-    low, height = along.min(axis=0), (matrix @ face.center).dot(normal)
-    origin = low[0] * np.array(x_axis) + low[1] * np.array(y_axis) + height * np.array(normal)
-    whole = np.broadcast_to(np.float32(1), (rows, columns))
-    axes = tuple(x_axis), tuple(y_axis), tuple(normal)
-    grid = Grid(tuple(origin.tolist()), *axes, *map(float, sides / [columns, rows]), columns, rows, whole)
-    return grid if target.side == FRONT else grid.flipped()
+    node = target.node
+    return scene.beamspread.side_for(shape.length, node.surface(), node.has_texture(), shape.is_bent)
 
 
 def line_of(announced: dict[Target, Announced], targets: Iterable[Target]) -> str:

@@ -7,6 +7,8 @@ import os
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
+import numpy as np
+
 from ..ldf.curvatures import curvatures_for, curved_angles_for, curved_photons_for, transport_length
 from ..ldf.library import PHOTONS, angles_for, is_known
 from ..scene.bent_grid import AnyGrid, BentGrid
@@ -53,12 +55,16 @@ MANY_TRIANGLES = 1000
 # Seconds per texel and direction of the solver `adaptive`, and per pair of texels of `direct`; for suns and for others.
 ADAPTIVE, DIRECT = (1e-6, 3e-6), (0.2e-9, 30e-9)
 
-# Seconds of the solution on surfaces that bend: in any case, for the tables of its media; and per texel in any case, up
-# to a mean free path of a texel in proportion to it, and for each doubling of longer ones.
-BENT, BENT_TEXEL, BENT_SHORT, BENT_LONG = 3.5, 6e-6, 30e-6, 18e-6
+# Seconds of the solution on surfaces that bend: in any case, for the tables of its media; and for each piece of a texel
+# and each channel of its own: in any case, up to a mean free path of a texel in proportion to it, and for each doubling
+# of longer ones.
+BENT, BENT_TEXEL, BENT_SHORT, BENT_LONG = 1.5, 3e-6, 45e-6, 5e-6
+# Part of a surface that bends that lamps and suns light, about.
+LIT_BY_LAMPS = 0.5
 
-# Seconds of the simulation of an angle in final quality, in half-spaces and in slabs.
-HALF_SPACE_ANGLE, SLAB_ANGLE = 6.0, 2.5
+# Seconds of the simulation of an angle in final quality, in half-spaces; and in slabs up to a thickness in mean free
+# paths, with whose root it grows beyond.
+HALF_SPACE_ANGLE, SLAB_ANGLE, SLAB_THICKNESS = 6.0, 0.9, 5.0
 # Seconds of the simulation of a photon on a curved surface, for each transport mean free path in mean free paths.
 CURVED_PHOTON = 0.2e-6
 
@@ -95,6 +101,9 @@ class Workload:
     suns, lamps : numbers of lights of one direction, and of one direction at each texel.
     broad_rays, narrow_rays : rays of each texel to lights from all around, and to other lights of a size.
     bounced : True if bounced light may be added.
+    pieces : into which a texel on surfaces that bend is divided, on average.
+    channels : number of those whose light is computed; those of one medium under light of one color share it.
+    lit : part of a surface that bends that light reaches, about.
     triangles : number of those that block light; 0 without shadows.
     path : mean free path in texels, the longest of the channels; on surfaces that bend.
     ior : index of refraction.
@@ -109,6 +118,9 @@ class Workload:
     broad_rays: float = 0.0
     narrow_rays: float = 0.0
     bounced: bool = False
+    pieces: float = 1.0
+    channels: int = 3
+    lit: float = 1.0
     triangles: int = 0
     path: float = 1.0
     ior: float = 1.0
@@ -143,10 +155,20 @@ class Workload:
                 load = replace(load, broad_rays=load.broad_rays + rays)
             else:
                 load = replace(load, narrow_rays=load.narrow_rays + rays)
-        material = surface.material
+        if is_bent:
+            load = replace(load, pieces=max(grids, key=lambda grid: grid.texels).pieces)
+        material, is_unknown = surface.material, bounced or unknown > 0
+        reaching = [light for light, _ in shared]
+        is_around = is_unknown or any(isinstance(light, WorldLight) for light in reaching)
         paths = surface.thickness / max(material.mean_free_path) if surface.thickness else math.inf
-        path = max(material.mean_free_path) / max(largest.pitch_x, largest.pitch_y)
-        return replace(load, path=path, ior=material.ior, thickness=paths)
+        return replace(
+            load,
+            channels=3 if is_unknown else channels_of(surface, reaching),
+            lit=1.0 if is_around else LIT_BY_LAMPS,
+            path=max(material.mean_free_path) / max(largest.pitch_x, largest.pitch_y),
+            ior=material.ior,
+            thickness=paths,
+        )
 
     def is_lit(self) -> bool:
         """True if light may reach the grids."""
@@ -179,7 +201,8 @@ class Workload:
         directions = self.lamps + self.broad_rays + self.narrow_rays + len(STRATA) * self.bounced
         if self.is_bent and settings.solver != "direct":
             doublings = math.log2(max(self.path, 1.0))
-            return BENT + (BENT_TEXEL + BENT_SHORT * min(self.path, 1.0) + BENT_LONG * doublings) * self.texels
+            of_sample = BENT_TEXEL + BENT_SHORT * min(self.path, 1.0) + BENT_LONG * doublings
+            return BENT + of_sample * self.texels * self.pieces * self.channels * self.lit
         if settings.solver != "fft":
             sun, direction = ADAPTIVE if settings.solver == "adaptive" else DIRECT
             pairs = self.texels if settings.solver == "adaptive" else self.texels**2
@@ -190,6 +213,17 @@ class Workload:
         if is_wide:
             return bounced + CHOICE[is_plain] + slab * WIDE[is_plain] * self.texels
         return bounced + (slab * LAMPS[is_plain] if self.lamps else SUNS) * self.texels
+
+
+def channels_of(surface: Surface, lights: Sequence[Light]) -> int:
+    """Number of channels whose light is computed on surfaces that bend: those of one medium share it."""
+    colors = [np.array(light.rgb()) for light in lights]
+    is_colored = any(light.is_colored for light in lights) or any(
+        not np.allclose(color * colors[0].sum(), colors[0] * color.sum(), rtol=1e-5) for color in colors
+    )
+    material = surface.material
+    of_channels = material.mean_free_path, surface.base_color or material.albedo, material.channel_anisotropy
+    return 3 if is_colored else len(set(zip(*of_channels)))
 
 
 def workloads_of(
@@ -226,7 +260,7 @@ def simulation_seconds(media: Sequence, settings: BakeSettings, is_bent: bool = 
 
 
 def _simulation(medium, quality: str, is_bent: bool) -> float:
-    per_angle = HALF_SPACE_ANGLE if math.isinf(medium.thickness) else SLAB_ANGLE
+    per_angle = min(SLAB_ANGLE * math.sqrt(max(medium.thickness / SLAB_THICKNESS, 1.0)), HALF_SPACE_ANGLE)
     plane = per_angle * len(angles_for(medium)) * PHOTONS[quality] / PHOTONS["final"]
     if not is_bent:
         return plane

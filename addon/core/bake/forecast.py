@@ -57,6 +57,7 @@ class Forecast:
     triangles : number of those that block light.
     unknown : fraction of all light, about, that is not among the lights, besides that which Cycles finds.
     is_bent : True if the receiver is a mesh that bends.
+    pieces : into which its texels are divided, on average, if it bends and the grids don't tell; see `Workload`.
     """
 
     name: str
@@ -67,6 +68,7 @@ class Forecast:
     finders: Finders = Finders()
     unknown: float = 0.0
     is_bent: bool = False
+    pieces: float = 0.0
 
     def steps(self, settings: BakeSettings) -> list[Estimate]:
         """Estimates of the steps, without the simulation of media."""
@@ -84,7 +86,8 @@ class Forecast:
             steps.append((BouncedLight.name, sides * bounced_seconds(self.triangles, len(self.lights), threads)))
         unknown = max(self.unknown, OF_WORLD * finders.world)
         loads = workloads_of(self.grids, self.lights, self.triangles, self.surface, settings, bounced, unknown)
-        seconds = sum(replace(load, is_bent=self.is_bent).seconds(settings) for load in loads)
+        known = {"is_bent": self.is_bent, **({"pieces": self.pieces} if self.pieces else {})}
+        seconds = sum(replace(load, **known).seconds(settings) for load in loads)
         steps.append((Solve.kind_for(settings), seconds))
         return [Estimate(kind, self.name, seconds) for kind, seconds in steps]
 

@@ -25,6 +25,10 @@ TEXTURED_SIDE = 1024
 # Texels in the diffuse mean free path, of the middle channel. More: finer new images, longer bakes.
 TEXELS_PER_PATH = 2.0
 
+# Texels in the transport mean free path of meshes that bend, from which on density asks for no more, since light is
+# smooth over that length. More: finer new images, whose bakes take longer in proportion to their texels.
+TEXELS_PER_TRANSPORT = 3.0
+
 # Texels along the longer side, at most, that are offered where a medium spreads light less than a texel.
 MAX_OFFERED = 8192
 
@@ -42,8 +46,7 @@ def spread_lengths(surface: Surface) -> list[float]:
     of its slowest mode, which is 0 at 2/3 of a transport mean free path outside.
     """
     material, lengths = surface.material, []
-    for path, albedo, forward in zip(material.mean_free_path, _albedo(surface), material.channel_anisotropy):
-        transport = path / (1 - albedo * forward)
+    for path, albedo, transport in zip(material.mean_free_path, _albedo(surface), transport_paths(surface)):
         rate = 3 * (1 - albedo) / (path * transport)
         if surface.thickness:
             rate += (math.pi / (surface.thickness + 4 / 3 * transport)) ** 2
@@ -122,15 +125,28 @@ def mean_size(mesh: FlatMesh, size: tuple[int, int]) -> tuple[int, int]:
     return width, height
 
 
-def side_for(length: float, surface: Surface, density: float, is_textured: bool = False) -> int:
+def transport_paths(surface: Surface) -> list[float]:
+    """Transport mean free path of each channel, scene units: light forgets its direction in it."""
+    material, albedos = surface.material, _albedo(surface)
+    return [
+        path / (1 - albedo * forward)
+        for path, albedo, forward in zip(material.mean_free_path, albedos, material.channel_anisotropy)
+    ]
+
+
+def side_for(length: float, surface: Surface, density: float, is_textured: bool = False, is_bent: bool = False) -> int:
     """Texels along the longer side of a new image: a power of two that shows the surface and its medium.
 
     Parameters
     ----------
     length : see `image_length`.
     density : texels per scene unit that a surface should have.
+    is_bent : True for a mesh that bends, each texel of which takes long. Slabs let light through that never scattered,
+        with sharp shadows: they keep their density.
     """
     lengths = spread_lengths(surface)
+    if is_bent and not is_textured and not surface.thickness:
+        density = min(density, TEXELS_PER_TRANSPORT / min(transport_paths(surface)))
     side = min(max(density * length, TEXTURED_SIDE if is_textured else MIN_SIDE), MAX_BY_DENSITY)
     if max(lengths) * MAX_SIDE >= length:  # else no image shows it
         side = max(side, min(TEXELS_PER_PATH * length / sorted(lengths)[1], MAX_SIDE))

@@ -8,10 +8,14 @@ import numpy as np
 
 from ..native import native
 from .grid import Grid, Vector, owner_number
+from .stretch import pieces_of_texels
 
 # Root of the number of texels among which hollows are looked for, and the depth of one over the surface's size. More
 # texels, less depth: smaller hollows count, and bounced light is looked for in more meshes.
 HOLLOW_SIDE, HOLLOW_DEPTH = 24, 0.02
+
+MAX_REACH = 0.02
+"""Most of a surface's size that it reaches beyond the middles of its texels. Larger: near objects return no light."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -77,6 +81,18 @@ class BentGrid:
     pitch_y = pitch_x
 
     @property
+    def pieces(self) -> float:
+        """Mean number of pieces into which the solver divides a texel."""
+        return pieces_of_texels(self.steps_x, self.steps_y, self.areas)
+
+    @property
+    def reach(self) -> float:
+        """How far the surface reaches beyond the middles of its texels, scene units, about."""
+        steps = np.abs(self.steps_x) + np.abs(self.steps_y)
+        half = 0.5 * float(np.linalg.norm(steps[self.areas > 0], axis=-1).max())
+        return min(half, MAX_REACH * self.size)  # steps of faces that are slivers in the map are long
+
+    @property
     def weights(self) -> np.ndarray:
         """Area of each texel, float32 (height, width), for means."""
         return self.areas
@@ -116,9 +132,7 @@ class BentGrid:
     def is_hollow(self) -> bool:
         """True if parts of the surface see each other: points of it lie above tangent planes of others."""
         few = self.coarse(HOLLOW_SIDE)
-        middles, normals = few.middles.reshape(-1, 3), few.normals.reshape(-1, 3)
-        heights = np.einsum("nc,mnc->mn", normals, middles[:, None] - middles)
-        return bool((heights > HOLLOW_DEPTH * self.size).any())
+        return see_each_other(few.middles.reshape(-1, 3), few.normals.reshape(-1, 3), self.size)
 
     def cosine_to(self, direction: Vector) -> float:
         """Least cosine between a unit vector and the normals."""
@@ -164,6 +178,12 @@ class BentGrid:
     def surface(self):
         """The native `Surface`, which views the arrays of the grid."""
         return native.Surface(self.native(), self.coverage, self.clearance, self.color_in, self.color_out)
+
+
+def see_each_other(points: np.ndarray, normals: np.ndarray, size: float) -> bool:
+    """True if some points (N, 3) of a surface lie above the tangent planes of others; `size`: that of the surface."""
+    heights = np.einsum("nc,mnc->mn", normals, points[:, None] - points)
+    return bool((heights > HOLLOW_DEPTH * size).any())
 
 
 AnyGrid = Grid | BentGrid

@@ -64,7 +64,8 @@ def sized(
         return replace(mesh, tiling=tiling), tiling.size
     if resolution is None and image is not None:
         return mesh, size_of_frames(image) if is_sequence(image) else tuple(image.size)
-    sides = (settings.side_for(length_of(item.mesh), item.surface, target.node.has_texture()) for item in sharing)
+    is_textured = target.node.has_texture()
+    sides = (settings.side_for(length_of(item.mesh), item.surface, is_textured, item.mesh.is_bent) for item in sharing)
     return mesh, texture_size(mesh, resolution or max(sides))
 
 
@@ -80,6 +81,6 @@ def _tile_sizes(
     for item in [] if resolution else sharing:
         for number, length in lengths_of_tiles(item.mesh).items():
             if number in sides:
-                side = settings.side_for(length, item.surface, target.node.has_texture())
+                side = settings.side_for(length, item.surface, target.node.has_texture(), item.mesh.is_bent)
                 sides[number] = max(sides[number], side)
     return {number: (side, side) for number, side in sides.items()}

@@ -1,0 +1,45 @@
+"""Stretch of texels: the solver for meshes that bend divides those that are long on the surface (bent_bake.cpp)."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from .polygons import Polygons
+
+MAX_STRETCH, MAX_PIECES = 1.3, 64
+"""Length over width of a texel from which it is divided, and into how many pieces at most, as native/bake has them."""
+
+
+def pieces_of_texels(steps_x: np.ndarray, steps_y: np.ndarray, areas: np.ndarray) -> float:
+    """Mean number of pieces of the texels whose area is not 0, by their steps (..., 3) along columns and rows."""
+    shown = areas > 0
+    metric = [
+        np.einsum("nc,nc->n", first[shown], second[shown], dtype=float)
+        for first, second in ((steps_x, steps_x), (steps_y, steps_y), (steps_x, steps_y))
+    ]
+    return float(_pieces(*metric).mean()) if shown.any() else 1.0
+
+
+def pieces_of_faces(polygons: Polygons) -> float:
+    """The same of the texels that show some faces, by their first three corners; 1 without UVs."""
+    if polygons.uvs is None or not polygons.count:
+        return 1.0
+    first = polygons.starts[:-1]
+    sides = [polygons.corners[first + n] - polygons.corners[first] for n in (1, 2)]
+    (u_1, v_1), (u_2, v_2) = ((polygons.uvs[first + n] - polygons.uvs[first]).T for n in (1, 2))
+    area = u_1 * v_2 - u_2 * v_1
+    weights = np.nan_to_num(polygons.uv_areas) * (area != 0)
+    if not 0 < weights.sum() < np.inf:
+        return 1.0
+    # Steps of the surface along u and v, times the area in the map, which cancels out.
+    along_u = sides[0] * v_2[:, None] - sides[1] * v_1[:, None]
+    along_v = sides[1] * u_1[:, None] - sides[0] * u_2[:, None]
+    products = [np.einsum("nc,nc->n", a, b) for a, b in ((along_u, along_u), (along_v, along_v), (along_u, along_v))]
+    return float(np.average(_pieces(*products), weights=weights))
+
+
+def _pieces(x: np.ndarray, y: np.ndarray, xy: np.ndarray) -> np.ndarray:
+    """Numbers of pieces of texels by the products of their steps: x with x, y with y, and x with y."""
+    mean, half = (x + y) / 2, np.hypot((x - y) / 2, xy)
+    stretch = np.sqrt((mean + half) / np.maximum(mean - half, 1e-12 * np.maximum(mean, 1e-300)))
+    return np.where(stretch > MAX_STRETCH, np.minimum(np.ceil(stretch / MAX_STRETCH), MAX_PIECES), 1.0)
