@@ -139,9 +139,9 @@ float BounceGuide::probability(std::uint32_t cell, std::uint32_t bin) const
     return values[bin] - (bin > 0 ? values[bin - 1] : 0.0f);
 }
 
-double BounceGuide::density(std::uint32_t cell, const Vec3& direction) const
+double BounceGuide::density(std::uint32_t cell, std::uint32_t bin) const
 {
-    return static_cast<double>(probability(cell, bin(direction))) * bins * 0.25 * inv_pi;
+    return static_cast<double>(probability(cell, bin)) * bins * 0.25 * inv_pi;
 }
 
 Vec3 BounceGuide::sample(std::uint32_t cell, const Vec2& place) const

@@ -47,7 +47,7 @@ public:
     bool knows(std::uint32_t cell) const { return m_cumulated[(cell + 1) * bins - 1] > 0.0f; }
     // Probability of a bin, and density, 1/sr, of the directions that `sample` draws.
     float probability(std::uint32_t cell, std::uint32_t bin) const;
-    double density(std::uint32_t cell, const Vec3& direction) const;
+    double density(std::uint32_t cell, std::uint32_t bin) const;
     Vec3 sample(std::uint32_t cell, const Vec2& place) const;
 
 private:

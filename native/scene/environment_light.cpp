@@ -158,17 +158,11 @@ public:
         return m_faces_all ? m_sky.at(glm::transpose(m_map.to_world) * normal) : m_irradiance;
     }
 
-    Vec3f radiance(const Vec3& direction) const override
-    {
-        const auto [x, y] = cell_of(direction);
-        return m_map.of_cell(x, y);
-    }
-
-    double density(const Vec3& direction) const override
+    Seen seen(const Vec3& direction) const override
     {
         const auto [x, y] = cell_of(direction);
         const double total = m_cumulated_rows.back();
-        return total > 0.0 ? m_in_row[y].weight(x) / total / solid_angle(y) : 0.0;
+        return {m_map.of_cell(x, y), total > 0.0 ? m_in_row[y].weight(x) / total / solid_angle(y) : 0.0};
     }
 
 private:

@@ -77,9 +77,13 @@ class DistantLight : public Light {
 public:
     const DistantLight* as_distant() const override { return this; }
 
-    // Radiance from the direction of a unit vector, W/(m^2 sr), and the density of the rays of `sample`, 1/sr.
-    virtual Vec3f radiance(const Vec3& direction) const = 0;
-    virtual double density(const Vec3& direction) const = 0;
+    struct Seen {
+        Vec3f radiance;  // W/(m^2 sr)
+        double density = 0.0;  // of the rays of `sample`, 1/sr
+    };
+
+    // What comes from the direction of a unit vector.
+    virtual Seen seen(const Vec3& direction) const = 0;
 };
 
 }  // namespace beamspread

@@ -159,13 +159,18 @@ void LightChoice::offer_guided(std::size_t light, const ShadingPoint& point, std
             sky.sample({&point.position, 1}, point.normal, {&place, 1}, &ray);
             direction = -ray.travel;
         }
-        const double density = guided * m_guide->density(cell, direction) + unguided * sky.density(direction);
+        // Much of what is drawn lies behind the surface and costs no more than this.
+        if (!(glm::dot(direction, point.normal) > min_cos_theta))
+            continue;
+        const std::uint32_t bin = BounceGuide::bin(direction);
+        const DistantLight::Seen seen = sky.seen(direction);
+        const double density = guided * m_guide->density(cell, bin) + unguided * seen.density;
         if (!(density > 0.0))
             continue;
         const LightRay ray{.travel = -direction,
                            .distance = std::numeric_limits<double>::infinity(),
-                           .flux = sky.radiance(direction) / static_cast<float>(density)};
-        const bool is_known = m_guide->probability(cell, BounceGuide::bin(direction)) > 0.0f;
+                           .flux = seen.radiance / static_cast<float>(density)};
+        const bool is_known = m_guide->probability(cell, bin) > 0.0f;
         reservoir.offer(with_radiance(light, point, ray), 1.0f, is_known ? 1.0f : unknown_factor, random);
     }
 }
