@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from beamspread import presets
 from beamspread.blender.node import draw
-from beamspread.blender.node.node import keep_names_of_presets, upgrade_nodes
+from beamspread.blender.node.node import keep_names_of_presets, upgrade_appended_nodes, upgrade_nodes
 from beamspread.core.bake.surface import Surface
 from beamspread.core.material import Material
 from nodes import Nodes
@@ -107,6 +107,23 @@ def test_node_of_an_older_file_keeps_its_color(node):
     assert node.surface().material.albedo == (0.9, 0.9, 0.9)
     node.color_mode = "BASE_COLOR"
     assert list(node.base_color) == pytest.approx(node.surface_in("ALBEDO").reflectance(), rel=ROUNDED)
+
+
+def test_node_that_is_appended_from_an_older_file_converts_its_color(node, tmp_path):
+    node.color_mode, node.albedo = "ALBEDO", (0.95,) * 3
+    for name in ("has_own_base_color", "has_own_albedo", "has_new_color"):
+        node.property_unset(name)
+    path = str(tmp_path / "older.blend")
+    tree = next(made for made in bpy.data.materials if made.node_tree == node.id_data)
+    bpy.data.libraries.write(path, {tree}, fake_user=True)
+    tree.name = "Own"
+    with bpy.data.libraries.load(path) as (there, here):
+        here.materials = there.materials
+    (appended,) = here.materials
+    older = next(made for made in appended.node_tree.nodes if made.bl_idname == "BeamspreadNode")
+    upgrade_appended_nodes()  # as the window does once it rests
+    older.color_mode = "BASE_COLOR"
+    assert list(older.base_color) == pytest.approx(older.surface_in("ALBEDO").reflectance(), rel=ROUNDED)
 
 
 def test_unit_scale_takes_the_name_of_a_preset_away(node):

@@ -18,6 +18,10 @@ def test_every_panel_the_node_and_its_menu_are_drawn(seen):
     assert set(seen["drawn"]) == {panel.__name__ for panel in panels._classes} | {"draw", "buttons"}
 
 
+def test_appended_nodes_of_older_files_are_upgraded(seen):
+    assert seen["upgraded"] == [False, True]
+
+
 def test_a_bake_runs_beside_the_user_and_one_at_a_time(seen):
     assert seen["returned"] == ["RUNNING_MODAL"]
     assert seen["running"] == "First / First"

@@ -155,6 +155,15 @@ def scenario():
     yield show_tabs
     yield lambda: len(results["drawn"]) >= len(panels._classes)
 
+    older = scenes.node_of(planes[1].data.materials[0])  # as an appended one: nothing tells where its color comes from
+    for name in ("has_own_base_color", "has_own_albedo"):
+        older.property_unset(name)
+    bpy.context.view_layer.update()
+    planes[1].location.x = 6
+    yield lambda: older.has_own_albedo
+    results["upgraded"] = [older.has_own_base_color, older.has_own_albedo]
+    planes[1].location.x = 5
+
     editor = next(area for area in areas() if area.type == "NODE_EDITOR")
     region = next(region for region in editor.regions if region.type == "WINDOW")
     with bpy.context.temp_override(window=bpy.context.window_manager.windows[0], area=editor, region=region):

@@ -60,8 +60,13 @@ def start(node, color) -> None:
 
 def upgrade_color(node) -> None:
     """Note which color of a node from an older file is the user's: the one that counts."""
-    if not (node.has_own_base_color or node.has_own_albedo):
+    if is_older(node):
         setattr(node, _OWN[node.color_mode], True)
+
+
+def is_older(node) -> bool:
+    """True if a version of the add-on that did not note the origin of colors made the node."""
+    return not (node.has_own_base_color or node.has_own_albedo)
 
 
 def note_own(node, mode: str) -> None:
@@ -92,7 +97,7 @@ def switch_mode(node) -> None:
     if getattr(node, _OWN[mode]):
         return
     if not getattr(node, _OWN[other]):
-        upgrade_color(node)  # an older node, appended to this file
+        upgrade_color(node)  # an older node that a script has appended: which mode it had is not known
         return
     surface = node.surface_in(other)
     try:

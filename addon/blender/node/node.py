@@ -22,6 +22,7 @@ from .color import (
     fill_preset,
     filling,
     is_filled,
+    is_older,
     keep_name_of_preset,
     note_medium,
     note_own,
@@ -380,6 +381,12 @@ def upgrade_nodes(*_arguments) -> None:
         if node.id_data.library is None:
             upgrade_color(node)
             _show_color(node)
+
+
+def upgrade_appended_nodes() -> None:
+    """The same for nodes that were appended to this file since: Blender 3.4 tells nobody of that."""
+    if any(node.id_data.library is None and is_older(node) for node in all_nodes()):
+        upgrade_nodes()
 
 
 _subscriber = object()

@@ -32,6 +32,7 @@ from ...images.files import file_of
 from ...images.udim import is_tiled, missing_files
 from ...images.undo import is_undone
 from ...node.find import find_bakeable, find_misplaced, image_of, rendered_counts
+from ...node.node import upgrade_appended_nodes
 from ...read.scene_cache import listeners
 from ...read.visibility import by_name, render_visible_names
 from ...registration import all_or_nothing, handlers
@@ -236,6 +237,7 @@ def _scan() -> float | None:
         _last["is scanning"] = True
         try:
             with context.temp_override(window=window):
+                upgrade_appended_nodes()
                 refresh(bpy.context)
         finally:
             ended = time.monotonic()
