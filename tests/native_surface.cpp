@@ -96,11 +96,15 @@ class HeldField {
 public:
     HeldField(const py::array& samples, const Sources& ldf, const std::vector<double>& albedo,
               const std::vector<double>& mean_free_path, double tolerance, double max_angle, bool is_colored,
-              int threads, std::size_t max_moment_bytes, bool is_direct, const std::string& side)
-        : m_samples(samples), m_ldf(ldf)
+              int threads, std::size_t max_moment_bytes, bool is_direct, const std::string& side, const py::array& steps)
+        : m_samples(samples), m_steps(steps), m_ldf(ldf)
     {
         SurfaceProblem problem;
         problem.samples = to_rows<SurfaceSample, float>("samples", samples, "contiguous float32 (N, 10)");
+        if (steps.size() > 0)
+            problem.steps = to_rows<SampleSteps, float>("steps", steps, "contiguous float32 (N, 6)");
+        if (!problem.steps.empty() && problem.steps.size() != problem.samples.size())
+            reject("steps", shape_text(steps), "a row for each sample");
         problem.channels = media_of(ldf, albedo, mean_free_path, side);
         problem.tolerance = tolerance;
         problem.max_angle_deg = max_angle;
@@ -140,6 +144,7 @@ public:
 
 private:
     py::array m_samples;
+    py::array m_steps;
     Sources m_ldf;
     std::size_t m_channels = 0;
     std::unique_ptr<SurfaceField> m_field;
@@ -154,11 +159,12 @@ void bind_surface(py::module_& m)
         .def(py::init<std::vector<double>>(), py::arg("curvatures"));
     py::class_<HeldField>(m, "SurfaceField", "Light on samples of a surface, by the solver `surface`.")
         .def(py::init<const py::array&, const Sources&, const std::vector<double>&, const std::vector<double>&, double,
-                      double, bool, int, std::size_t, bool, const std::string&>(),
+                      double, bool, int, std::size_t, bool, const std::string&, const py::array&>(),
              py::arg("samples"), py::arg("ldf"), py::arg("albedo"), py::arg("mean_free_path"),
              py::arg("tolerance") = 1e-3, py::arg("max_angle") = 88.0, py::arg("is_colored") = false,
              py::arg("threads") = 0, py::arg("max_moment_bytes") = 0, py::arg("is_direct") = false,
-             py::arg("side") = "reflected",
+             py::arg("side") = "reflected", py::arg("steps") = Array<float>(0),
+             "`steps`: float32 (N, 6), steps from each sample to its neighbors along columns and rows. "
              "`samples`: float32 (N, 10), position, normal, tangent and area.")
         .def("add", &HeldField::add, py::arg("travel"), py::arg("irradiance"), py::arg("color"), py::arg("first") = 0,
              "Add a ray to each of the samples from `first` on: float32 (N, 3) in their frames and channels.")

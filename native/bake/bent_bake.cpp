@@ -19,33 +19,16 @@ namespace {
 constexpr std::size_t survey_texels = 2048;
 constexpr int survey_rays = 4;
 
-// The solver takes samples as disks, which overlap where texels are long. Long texels are divided into pieces: their length
-// over width from which on, their length over the shortest mean free path below which they stay whole, and their largest
-// number. Larger lengths: fewer samples, and luminance that is too high there (docs/tuning.md).
+// The solver takes samples as disks, which overlap where texels are long: a texel's light reaches its neighbors beside in
+// place of its own ends. Long texels are divided into pieces: their length over width from which on, their length over the
+// shortest mean free path below which they stay whole, and their largest number. Larger lengths: fewer samples, and light
+// that is blurred across long texels (docs/tuning.md).
 constexpr double max_stretch = 1.3;
 constexpr double short_in_paths = 0.1;
 constexpr std::size_t max_pieces = 64;
 
 // Coverage that smaller ones count as: rounding decides about their areas.
 constexpr float least_coverage = 1e-3f;
-
-// The longer half axis of the ellipse that a texel's steps span, world, and the length of the other one.
-struct Ellipse {
-    Vec3 axis;
-    double length;
-    double width;
-
-    explicit Ellipse(const BentTexel& texel)
-    {
-        const Vec3 x(texel.step_x);
-        const Vec3 y(texel.step_y);
-        // The steps' singular values: turned by this angle they are at right angles (one step of Jacobi's method).
-        const double angle = 0.5 * std::atan2(2.0 * glm::dot(x, y), glm::dot(x, x) - glm::dot(y, y));
-        axis = x * std::cos(angle) + y * std::sin(angle);
-        length = glm::length(axis);
-        width = glm::length(y * std::cos(angle) - x * std::sin(angle));
-    }
-};
 
 // The samples of a mesh, in the order of its texels: one for each texel inside, or several for a long one.
 struct Samples {
@@ -58,14 +41,18 @@ struct Samples {
             const BentTexel& texel = grid.bent_texel(i);
             if (!(texel.area > 0.0f))
                 continue;
-            const Ellipse ellipse(texel);
-            const double longest = std::max(max_stretch * ellipse.width, short_in_paths * mean_free_path);
-            const double wanted = ellipse.length > longest ? std::ceil(ellipse.length / longest) : 1.0;
+            Vec3 across(texel.step_x);
+            Vec3 along(texel.step_y);
+            reduce_steps(across, along);
+            const double length = glm::length(along);
+            const double longest = std::max(max_stretch * glm::length(across), short_in_paths * mean_free_path);
+            const double wanted = length > longest ? std::ceil(length / longest) : 1.0;
             const auto pieces = static_cast<std::size_t>(std::min(wanted, static_cast<double>(max_pieces)));
             for (std::size_t k = 0; k < pieces; ++k) {
                 const double at = (static_cast<double>(k) + 0.5) / static_cast<double>(pieces) - 0.5;
-                all.push_back({Vec3f(texel.position + at * ellipse.axis - origin), texel.normal, texel.tangent,
+                all.push_back({Vec3f(texel.position + at * along - origin), texel.normal, texel.tangent,
                                texel.area / static_cast<float>(pieces)});
+                steps.push_back({Vec3f(across), Vec3f(along / static_cast<double>(pieces))});
                 const float coverage = surface.coverage ? surface.coverage[i] : 1.0f;
                 whole_areas.push_back(all.back().area / std::max(coverage, least_coverage));
             }
@@ -74,6 +61,7 @@ struct Samples {
     }
 
     std::vector<SurfaceSample> all;
+    std::vector<SampleSteps> steps;
     std::vector<float> whole_areas;  // see `SurfaceProblem`
     std::vector<std::size_t> first;  // [texel], and the number of all
 };
@@ -193,6 +181,7 @@ double bake_bent(const Surface& surface, const std::vector<const SurfaceLight*>&
     const std::vector<double> means = survey(surface, lights, options);
     const double all = std::accumulate(means.begin(), means.end(), 0.0);
     const SurfaceProblem problem{.samples = samples.all,
+                                 .steps = samples.steps,
                                  .whole_areas = samples.whole_areas,
                                  .channels = channels,
                                  .tolerance = options.tolerance,

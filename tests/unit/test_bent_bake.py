@@ -52,17 +52,17 @@ def test_colors_of_a_texture_count_on_the_way_in_and_out(media):
     np.testing.assert_allclose(bent.sum((0, 1)), plane.sum((0, 1)), rtol=6e-3)
 
 
-@pytest.mark.parametrize("stretch", [1.5, 2, 4])
-@pytest.mark.parametrize("path", [0.01, 0.002])
+@pytest.mark.parametrize("stretch", [1, 1.2, 1.5, 2, 4, 8])
+@pytest.mark.parametrize("path", [0.05, 0.01, 0.002])
 def test_long_texels_have_the_light_of_their_area(stretch, path, media):
-    """Texels of .05 in one direction under a sun, far from the border: 1.5 times as long as wide they are off by 4.3 %,
-    others by 1.3 %.
+    """Texels of .05 in one direction under a sun, far from the border: .3 % measured, by tables between shapes and the
+    tolerance of both solvers. Without their shape, 1.5 : 1 is off by 5 %.
     """
     grid = make_grid(24, size=(1.2, 1.2 / stretch))
-    lights, thin = [(LAMPS["sun"], WHITE, None)], {**media, "mean_free_path": [path] * 3}
-    plane = baked(native.Surface(native.ReceiverGrid(**grid)), lights, thin)[12, 12]
-    bent = baked(native.Surface(flat(grid).native()), lights, thin)[12, 12]
-    np.testing.assert_allclose(bent, plane, rtol=0.05 if stretch == 1.5 else 0.02)
+    lights, thin = [(native.SunLight((0.5, 0.2, -0.6), 0.0), WHITE, None)], {**media, "mean_free_path": [path] * 3}
+    surfaces = [native.Surface(texels) for texels in (native.ReceiverGrid(**grid), flat(grid).native())]
+    plane, bent = (baked(surface, lights, thin, tolerance=1e-3)[12, 12] for surface in surfaces)
+    np.testing.assert_allclose(bent, plane, rtol=5e-3)
 
 
 def test_areas_count_and_coverage_does_not(media):

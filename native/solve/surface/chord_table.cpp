@@ -6,6 +6,7 @@
 #include <optional>
 
 #include "base/constants.h"
+#include "solve/surface/lattice_excess.h"
 
 namespace beamspread {
 
@@ -15,10 +16,6 @@ namespace {
 // time.
 constexpr float disk_end_radii = 8.0f;
 constexpr float disk_first_radii = 1.0f;
-
-// Least chord of another sample, in radii: it lies outside of the disk. Texels at the rims of UV islands are cut, and their
-// middles lie within the disks of their neighbors.
-constexpr float disk_begin_radii = 1.125f;
 
 // Fraction of the tolerance that functions may have where they are left out. Larger: less time for light far away.
 constexpr double block_share = 0.5;
@@ -237,15 +234,23 @@ DiskTable make_disk(const SurfaceBasis& basis, float radius, float reach)
     disk.light.first = chord_step(disk_first_radii * radius);
     fill_chord_table(basis, disk.light, radius, std::min(disk.end, reach));
     const std::size_t results = disk.light.values.size();
-    disk.excess.assign(results, std::vector<double>(basis.rank.size()));
-    parallel_for(results * basis.rank.size(), [&](std::size_t item) {
-        const std::size_t r = item / basis.rank.size();
-        const std::size_t lane = item % basis.rank.size();
-        if (basis.harmonic[lane] != 0)
-            return;
-        const ScaledProfile& scaled = profiles_of(basis, r, flat_index(basis, r))[basis.rank[lane]];
-        disk.excess[r][lane] = grid_excess(scaled.profile, static_cast<double>(radius) / scaled.mean_free_path);
-    });
+    const std::size_t lanes = basis.functions();
+    for (std::size_t r = 0; r < results; ++r) {
+        AlignedVector<float>& excess = disk.excess.emplace_back(neighborhood_count * 2 * lanes, 0.0f);
+        const std::vector<ScaledProfile>& profiles = profiles_of(basis, r, flat_index(basis, r));
+        parallel_for(profiles.size(), [&](std::size_t rank) {
+            const std::vector<double> of_rank =
+                lattice_excess(profiles[rank].profile, static_cast<double>(radius) / profiles[rank].mean_free_path);
+            for (std::size_t lane = 0; lane < basis.rank.size(); ++lane) {
+                const auto m = static_cast<std::size_t>(basis.harmonic[lane]);
+                if (basis.rank[lane] != rank || m % 2 != 0)
+                    continue;
+                for (std::size_t row = 0; row < 2 * neighborhood_count; ++row)
+                    excess[row * lanes + lane] =
+                        static_cast<float>(of_rank[(row / 2 * even_harmonics + m / 2) * 2 + row % 2]);
+            }
+        });
+    }
     return disk;
 }
 

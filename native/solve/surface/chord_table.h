@@ -41,13 +41,17 @@ struct ChordTable {
     }
 };
 
+// Least chord of another sample, in radii: it lies outside of the disk. Texels at the rims of UV islands are cut, and their
+// middles lie within the disks of their neighbors.
+inline constexpr float disk_begin_radii = 1.125f;
+
 // Light of a disk, which stands for a sample.
 struct DiskTable {
     float radius = 0.0f;  // metres
     float begin = 0.0f;   // least chord of other samples, metres: samples do not overlap, disks may
     float end = 0.0f;     // chord from which its light counts as a point's, metres
     ChordTable light;
-    std::vector<std::vector<double>> excess;  // [result][lane]: see `grid_excess`; of m = 0
+    std::vector<AlignedVector<float>> excess;  // [result], [neighborhood][cosine, sine][lane]: see `lattice_excess`
 };
 
 // Light of a point.
@@ -66,10 +70,6 @@ std::size_t flat_index(const SurfaceBasis& basis, std::size_t result);
 
 // Fills a table of a disk (radius 0: a point) up to a chord.
 void fill_chord_table(const SurfaceBasis& basis, ChordTable& table, float radius, float end);
-
-// Excess of the light of evenly lit disks on a square grid over that of an even plane, per irradiance. It is not 0 where
-// the medium spreads about as far as the grid's pitch (Poisson's sum formula).
-double grid_excess(const RadialProfile& profile, double radius);
 
 // The table of a disk; light from beyond `reach` counts as none. And of a point, from a chord on; functions are left out
 // where they have less than the tolerance of the power.

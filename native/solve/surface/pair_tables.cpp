@@ -80,16 +80,9 @@ void PairTables::make_self(const SurfaceBasis& basis, float min_radius, float ma
                 return;
             for (std::size_t row = 0; row < m_self.rows; ++row) {
                 const float radius = chord_of(m_self.first + static_cast<std::uint32_t>(row));
-                const double position = std::clamp(place_of(radius), 0.0, static_cast<double>(disks.size() - 1));
-                const auto before = static_cast<std::size_t>(position);
-                const std::size_t after = std::min(before + 1, disks.size() - 1);
-                const double smaller = std::min(static_cast<double>(radius / disks.front()->radius), 1.0);
-                const double there = smaller * smaller *
-                                     std::lerp(disks[before]->excess[r][lane], disks[after]->excess[r][lane],
-                                               position - std::floor(position));
                 const double within =
                     profiles[rank].profile.cumulative(static_cast<double>(radius) / profiles[rank].mean_free_path)[0];
-                m_self.values[r][row * blocks * lanes_per_block + lane] = static_cast<float>(2.0 * pi * within - there);
+                m_self.values[r][row * blocks * lanes_per_block + lane] = static_cast<float>(2.0 * pi * within);
             }
         });
     }
@@ -125,16 +118,49 @@ std::size_t PairTables::disk(float area) const
     return std::min(static_cast<std::size_t>(std::max(nearest, 0L)), disks.size() - 1);
 }
 
-void PairTables::add_self(float area, std::size_t result, float* factors) const
+float PairTables::self_light(float area, const LatticeShape& lattice, std::size_t result, const float* moments) const
 {
     const float radius = std::sqrt(area * static_cast<float>(inv_pi));
     const std::uint32_t step = std::clamp(chord_step(radius), m_self.first, m_self.first + m_self.rows - 2);
     const float before = chord_of(step);
     const float part = std::clamp((radius - before) / (chord_of(step + 1) - before), 0.0f, 1.0f);
     const std::size_t lanes = blocks * lanes_per_block;
-    const float* values = m_self.values[result].data() + (step - m_self.first) * lanes;
-    for (std::size_t i = 0; i < lanes; ++i)
-        factors[i] += values[i] + part * (values[lanes + i] - values[i]);
+    const float* within = m_self.values[result].data() + (step - m_self.first) * lanes;
+
+    // Excess of the light of all samples around. That of smaller disks than any is in proportion to their area.
+    const auto place = static_cast<float>(std::clamp(place_of(radius), 0.0, static_cast<double>(disks.size() - 1)));
+    const float nearest = std::nearbyint(place);
+    const DiskTable& disk = *disks[static_cast<std::size_t>(nearest)];
+    const float smaller = std::min(radius / disks.front()->radius, 1.0f);
+    const Neighborhoods near(lattice, (nearest - place) * static_cast<float>(m_disk_step));
+    std::array<Vec2f, surface_harmonics> turned{Vec2f(1.0f, 0.0f)};
+    for (std::size_t m = 1; m < surface_harmonics; ++m) {
+        const Vec2f& last = turned[m - 1];
+        turned[m] = {last.x * lattice.shortest.x - last.y * lattice.shortest.y,
+                     last.x * lattice.shortest.y + last.y * lattice.shortest.x};
+    }
+    const float mirrored = lattice.is_mirrored ? -1.0f : 1.0f;
+    float sum = 0.0f;
+    for (std::size_t b = 0; b < blocks; ++b) {
+        std::array<float, lanes_per_block> cosine{}, sine{};
+        for (std::size_t n = 0; n < near.index.size(); ++n) {
+            const float* values = disk.excess[result].data() + near.index[n] * 2 * lanes + b * lanes_per_block;
+            const float weight = smaller * smaller * near.weight[n];
+            for (std::size_t k = 0; k < lanes_per_block; ++k) {
+                cosine[k] += weight * values[k];
+                sine[k] += weight * values[lanes + k];
+            }
+        }
+        const float* light = moments + b * 2 * lanes_per_block;
+        for (std::size_t k = 0; k < lanes_per_block; ++k) {
+            const std::size_t lane = b * lanes_per_block + k;
+            const Vec2f& turn = turned[static_cast<std::size_t>(harmonic[lane])];
+            const float own = within[lane] + part * (within[lanes + lane] - within[lane]);
+            sum += (own - cosine[k] * turn.x + mirrored * sine[k] * turn.y) * light[k] -
+                   (cosine[k] * turn.y + mirrored * sine[k] * turn.x) * light[lanes_per_block + k];
+        }
+    }
+    return sum;
 }
 
 }  // namespace beamspread

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "solve/surface/chord_table.h"
+#include "solve/surface/lattice_excess.h"
 #include "solve/surface/surface_kernels.h"
 
 namespace beamspread {
@@ -42,8 +43,9 @@ public:
     // Index of the disk that stands for a sample of this area, m^2.
     std::size_t disk(float area) const;
 
-    // Part of its own light in the radiant exitance of a sample's middle: factors of the moments m = 0, [block][lane].
-    void add_self(float area, std::size_t result, float* factors) const;
+    // The radiant exitance of a sample's middle by its own light, of which the moments of a set are given. On even
+    // lattices of samples, the sum of all light is then that of a plane.
+    float self_light(float area, const LatticeShape& lattice, std::size_t result, const float* moments) const;
 
     // Bounds on the second derivatives of the first function, [row of the point], 1 / m^4. They don't grow with the chord.
     std::vector<double> second_derivatives(std::size_t result) const;
@@ -63,7 +65,7 @@ private:
     double place_of(float radius) const;
 
     double m_disk_step = 1.0;  // between disks, octaves of the radius
-    ChordTable m_self;  // over the radius of the sample's disk, one curvature
+    ChordTable m_self;  // light within a sample's disk, over its radius; one curvature
 };
 
 }  // namespace beamspread

@@ -267,7 +267,6 @@ void SurfaceField::solve_leaf(std::size_t leaf, const SurfaceTree::Opening& open
 {
     m_tree.find(leaf, opening, m_tables.reach, sources);
     const std::span<const PairSource> near = sources.near;
-    std::vector<float> factors(m_basis.functions());
     std::size_t self = 0;
     for (const std::uint32_t i : m_tree.samples_of(leaf)) {
         const SurfaceSample& sample = m_problem.samples[i];
@@ -282,7 +281,7 @@ void SurfaceField::solve_leaf(std::size_t leaf, const SurfaceTree::Opening& open
         add(near.subspan(is_lit ? self + 1 : self), false);
         add(sources.far, true);
         if (is_lit) {
-            add_self(i, factors, exitance.sums);
+            add_self(i, exitance.sums);
             ++self;
         }
         store_exitance(i, exitance);
@@ -297,17 +296,25 @@ float SurfaceField::own_area(std::size_t sample) const
     return m_problem.whole_areas.empty() ? area : std::max(area, least_own * m_problem.whole_areas[sample]);
 }
 
-void SurfaceField::add_self(std::size_t sample, std::vector<float>& factors, std::array<float, 3>& sums) const
+LatticeShape SurfaceField::lattice(std::size_t sample) const
 {
-    for (std::size_t r = 0; r < m_tables.results; ++r) {
-        std::fill(factors.begin(), factors.end(), 0.0f);
-        m_tables.add_self(own_area(sample), r, factors.data());
-        const float* moments =
-            m_moments.data() + sample * m_basis.moments() + m_tables.set[r] * 2 * m_basis.functions();
-        for (std::size_t b = 0; b < m_basis.blocks; ++b)
-            for (std::size_t k = 0; k < lanes_per_block; ++k)
-                sums[r] += factors[b * lanes_per_block + k] * moments[b * 2 * lanes_per_block + k];
-    }
+    if (m_problem.steps.empty())
+        return {};
+    const SurfaceSample& at = m_problem.samples[sample];
+    const Vec3f binormal = glm::cross(at.normal, at.tangent);
+    const auto in_frame = [&](const Vec3f& step) {
+        return Vec2f(glm::dot(step, at.tangent), glm::dot(step, binormal));
+    };
+    return {in_frame(m_problem.steps[sample].x), in_frame(m_problem.steps[sample].y)};
+}
+
+void SurfaceField::add_self(std::size_t sample, std::array<float, 3>& sums) const
+{
+    const LatticeShape shape = lattice(sample);
+    for (std::size_t r = 0; r < m_tables.results; ++r)
+        sums[r] += m_tables.self_light(
+            own_area(sample), shape, r,
+            m_moments.data() + sample * m_basis.moments() + m_tables.set[r] * 2 * m_basis.functions());
 }
 
 void SurfaceField::store(std::size_t sample, const Exitance& exitance, Areas& areas, float* luminance) const

@@ -22,8 +22,14 @@
 
 namespace beamspread {
 
+// Steps from a sample to its neighbors: they span its area, or that of a whole one in proportion.
+struct SampleSteps {
+    Vec3f x, y;
+};
+
 struct SurfaceProblem {
     std::span<const SurfaceSample> samples;
+    std::span<const SampleSteps> steps{};  // [sample]; empty: unknown
     std::span<const float> whole_areas{};  // [sample] m^2, without the edge that cuts it; empty: none is cut
     std::vector<ChannelMedium> channels;  // at most 3
     double tolerance = 1e-3;              // largest error of a luminance against all pairs, relative to the largest
@@ -79,7 +85,8 @@ private:
     void solve_leaf(std::size_t leaf, const SurfaceTree::Opening& opening, SurfaceTree::Sources& sources,
                     const std::function<void(std::size_t, const Exitance&)>& store_exitance) const;
     float own_area(std::size_t sample) const;
-    void add_self(std::size_t sample, std::vector<float>& factors, std::array<float, 3>& sums) const;
+    LatticeShape lattice(std::size_t sample) const;
+    void add_self(std::size_t sample, std::array<float, 3>& sums) const;
     void store(std::size_t sample, const Exitance& exitance, Areas& areas, float* luminance) const;
     void set_color(const std::vector<double>& color);
 

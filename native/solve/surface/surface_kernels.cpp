@@ -130,7 +130,7 @@ std::size_t SurfaceKernels::bytes() const
     const std::lock_guard guard(m_lock);
     std::size_t sum = 0;
     for (const auto& [number, disk] : m_disks)
-        sum += disk->light.bytes();
+        sum += disk->light.bytes() + disk->excess.size() * disk->excess.front().size() * sizeof(float);
     for (const auto& [octave, point] : m_points)
         sum += point->light.bytes() + point->laplacian.bytes();
     for (const std::vector<ScaledProfile>& profiles : m_basis.terms.basis.profiles)
