@@ -12,8 +12,8 @@ Each package imports only those above it (tests/unit/test_layers.py reads this l
     display    exposure, sRGB and PNG of files that hold no values above 1
     recent     caches
     arrays     array arguments, converted without loss
-    scene      receivers (charts on planes), lights, triangles that cast shadows
     material   optical properties, measured presets
+    scene      receivers (charts on planes), lights, triangles that cast shadows
     ldf        libraries, samples, the albedo for a color
     bake       from a job to its layers, with their margin, and the status of each bake
     live       previews that follow a scene while it changes

@@ -20,6 +20,9 @@ Media: TypeAlias = "native.Medium | tuple[native.Medium, native.Medium, native.M
 """One medium for all channels, or one for each."""
 
 PRESET_FILE = Path(__file__).resolve().parents[1] / "data" / "materials.csv"
+MAX_ALBEDO = 0.99999
+"""Largest albedo that colors may ask for. Simulations follow light for enough scatterings up to it."""
+
 METRES_PER_MM = 1e-3
 # Absorption, 1/mm, assumed where Jensen's table prints 0: half its last digit. Without absorption a half-space has no
 # solution. Larger: darker presets.

@@ -13,7 +13,7 @@ import time
 import _native_test
 import numpy as np
 from beamspread import Medium, convolve, library
-from beamspread.core.bake.layers import TOLERANCE
+from beamspread.core.bake.spread_light import TOLERANCE
 
 ALBEDO = (0.95, 0.9, 0.6)
 PATHS = np.array((1.0, 0.8, 0.6))

@@ -12,8 +12,8 @@ import time
 
 import numpy as np
 from beamspread import library, presets
-from beamspread.core.bake import layers as bakes
 from beamspread.core.bake.bake_settings import BakeSettings
+from beamspread.core.bake.spread_light import Spreading, spread
 from beamspread.core.bake.surface import channel_media
 from beamspread.core.scene.grid import Grid
 from beamspread.core.scene.illumination import Illumination
@@ -75,7 +75,8 @@ def bake(size, seed, shapes):
     lights = [sky(), *areas()]
     marble = presets()["marble"]
     sources = [library(medium) for medium in channel_media(marble, 0.0)]
-    result = bakes.spread([floor(size)], Illumination(lights, shapes), marble, sources, BakeSettings(), seed=seed)[0]
+    spreading = Spreading(Illumination(lights, shapes), marble, sources, BakeSettings(), seed=seed)
+    result = spread([floor(size)], spreading)[0]
     return result, time.perf_counter() - started
 
 

@@ -93,9 +93,8 @@ def bake_of(obj, number=0, size=SIZE, **changes):
 def evaluated(obj, number=0):
     """The colour and the coverage of the texels."""
     job = with_color(bake_of(obj, number).job)
-    mean = np.array(job.surface.base_color)
-    # color_in times color_out is the colour over its mean.
-    colors = [chart.grid.color_in * chart.grid.color_out * mean for chart in job.receiver.charts]
+    grids = [chart.grid for chart in job.receiver.charts]
+    colors = [grid.albedo if grid.base_color is None else grid.base_color for grid in grids]
     return job.receiver.to_texture(colors), job.receiver.coverage
 
 
@@ -298,7 +297,7 @@ def test_a_job_from_a_file_asks_cycles_for_the_same(plane):
     add_noise_to(plane.data.materials[0])
     job = bake_of(plane).job
     here, again = (with_color(one) for one in (job, pickle.loads(pickle.dumps(job))))
-    np.testing.assert_array_equal(here.receiver.charts[0].grid.color_in, again.receiver.charts[0].grid.color_in)
+    np.testing.assert_array_equal(here.receiver.charts[0].grid.albedo, again.receiver.charts[0].grid.albedo)
     folder = job.steps[0].copy.scene.folder
     del again
     assert folder.exists()  # it belongs to the job that has made it

@@ -315,6 +315,7 @@ def test_an_object_that_casts_no_light_is_not_read_again_for_its_node(monkeypatc
 
 def add_stripes(material, values=(0.2, 0.7)):
     """Image of upright stripes at the Base Color."""
+    scenes.node_of(material).color_mode = "BASE_COLOR"
     colors = np.ones((4, 8, 4), np.float32)
     colors[..., :3] = np.resize(np.repeat(values, 2), 8)[None, :, None]
     image = bpy.data.images.new("Stripes", 8, 4, float_buffer=True)

@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 from beamspread.core.bake.bake_settings import COMBINED
 from beamspread.core.bake.job import BakeJob
-from beamspread.core.bake.layers import LAYERS, arrive, mean_direction, rays_per_texel
+from beamspread.core.bake.layers import LAYERS, arrive, mean_direction
+from beamspread.core.bake.spread_light import rays_per_texel
 from beamspread.core.bake.steps import BAKE_STEPS
 from beamspread.core.bake.surface import Surface
 from beamspread.core.errors import MaterialError

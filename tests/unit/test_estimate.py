@@ -8,8 +8,8 @@ from beamspread import Medium
 from beamspread.core.bake import steps
 from beamspread.core.bake.estimate import Workload, bounced_seconds, channels_of, simulation_seconds
 from beamspread.core.bake.forecast import Finders, Forecast, seconds_of, steps_of_bakes
-from beamspread.core.bake.layers import MIN_RAYS
 from beamspread.core.bake.pace import Estimate, Pace, pace
+from beamspread.core.bake.spread_light import MIN_RAYS
 from beamspread.core.bake.surface import Surface
 from beamspread.core.ldf.library import angles_for
 from beamspread.core.scene.lights import AreaLight, PointLight, SunLight

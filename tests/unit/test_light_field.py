@@ -9,9 +9,9 @@ from pathlib import Path
 import beamspread
 import numpy as np
 import pytest
-from beamspread.core.bake import layers
+from beamspread.core.bake import spread_light
 from beamspread.core.bake.bake_settings import BakeSettings
-from beamspread.core.bake.layers import TOLERANCE
+from beamspread.core.bake.spread_light import TOLERANCE
 from beamspread.core.material import Material
 from beamspread.core.native import native
 from beamspread.core.scene.illumination import Illumination
@@ -39,7 +39,7 @@ def suns(count):
 
 
 def bake_as_it_comes(monkeypatch, *arguments):
-    monkeypatch.setattr(layers, "MAX_STORED_BYTES", 0)
+    monkeypatch.setattr(spread_light, "MAX_STORED_BYTES", 0)
     return bake(*arguments)
 
 
@@ -139,7 +139,7 @@ def test_solvers_that_take_lights_apart_agree(solver, monkeypatch):
     tolerance.
     """
     for name in ("MAX_RAYS", "MIN_RAYS"):
-        monkeypatch.setattr(layers, name, 2)
+        monkeypatch.setattr(spread_light, name, 2)
     arguments = square(16), Illumination([sky()], WALL), MATERIAL, 0.0
     settings = replace(SETTINGS, samples=4)
     apart = bake(*arguments, replace(settings, solver=solver))
@@ -149,7 +149,7 @@ def test_solvers_that_take_lights_apart_agree(solver, monkeypatch):
 def test_rays_return_unscattered_from_a_slab_as_lights_do(monkeypatch):
     """A fifth of a mean free path thick, where some per cent of the light returns from the far side unscattered."""
     for name in ("MAX_RAYS", "MIN_RAYS"):
-        monkeypatch.setattr(layers, name, 2)
+        monkeypatch.setattr(spread_light, name, 2)
     settings = replace(SETTINGS, samples=4)
     arguments = square(8), Illumination([sky()]), replace(MATERIAL, mean_free_path=(0.05, 0.05, 0.05)), 0.01
     apart = bake(*arguments, replace(settings, solver="direct"))
@@ -217,7 +217,7 @@ MEMORY = """
 import sys
 sys.path[:0] = sys.argv[2:]
 from test_light_field import *
-layers.MAX_STORED_BYTES = 0
+spread_light.MAX_STORED_BYTES = 0
 bake(square(512), Illumination(lamps(int(sys.argv[1]))), MATERIAL, 0.0, SETTINGS)
 print([line.split()[1] for line in open("/proc/self/status") if line.startswith("VmHWM")][0])
 """

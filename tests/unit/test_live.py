@@ -23,7 +23,7 @@ from beamspread.core.scene.illumination import Illumination
 from beamspread.core.scene.lights import AreaLight, PointLight, SunLight
 from beamspread.core.scene.polygons import Polygons
 from beamspread.core.scene.receiver import Receiver, build_receiver
-from beamspread.core.scene.texture import Texture
+from beamspread.core.scene.texture import MULTIPLIED, BaseColor, Texture, TextureUse
 from beamspread.core.target import Target
 
 CORNERS = np.array([(-1.0, -1, 0), (1, -1, 0), (1, 1, 0), (-1, 1, 0)])
@@ -237,16 +237,34 @@ def test_quick_renderings_have_all_detail_of_a_texture(blur, renderer):
     receiver = build_receiver(flatten(FLOOR), 256, 256)
     bright = np.add.outer(np.arange(256) // 8, np.arange(256) // 8) % 2
     colors = np.repeat(np.where(bright, 0.7, 0.3)[..., None], 3, axis=2).astype(np.float32)
-    texture = Texture(receiver, (colors,), blur)
+    texture = Texture(receiver, (colors,), TextureUse(MULTIPLIED, blur))
     textured = replace(plain, texture=texture, surface=replace(plain.surface, base_color=(0.5, 0.5, 0.5)))
     assert textured.key != plain.key
-    assert textured.key != replace(textured, texture=replace(texture, blur=1.0)).key
+    assert textured.key != replace(textured, texture=replace(texture, use=TextureUse(MULTIPLIED, 1.0))).key
     quick, exact = renderer.quick(textured, 64), renderer.exact(textured)
     job = BakeJob("Floor", texture.on(receiver), textured.illumination, textured.surface, textured.settings, BAKE_STEPS)
     np.testing.assert_allclose(exact.texture, job.run().texture, rtol=1e-4, atol=1e-6)
     total, worst = errors_of(quick, exact)
     assert total < (0.01 if blur == 0 else 0.05)
     assert worst < (0.02 if blur == 0 else 0.1)
+
+
+def test_quick_renderings_show_how_light_scatters_in_a_texture(renderer):
+    """With a noise of 10 % at 48 texels: their mean is right within 2 %, and half of the convention's error is gone."""
+    plain = replace(live_target(LAMP), size=(96, 96))
+    receiver = build_receiver(flatten(FLOOR), 96, 96)
+    bright = np.add.outer(np.arange(96) // 8, np.arange(96) // 8) % 2
+    colors = np.repeat(np.where(bright, 0.95, 0.4)[..., None], 3, axis=2).astype(np.float32)
+    texture = Texture(receiver, (colors,), TextureUse())
+    surface = plain.surface.colored(BaseColor(texture))
+    scattered = replace(plain, texture=texture, surface=surface)
+    multiplied = replace(scattered, texture=surface.multiplied(texture))
+    quick, exact, other = renderer.quick(scattered, 48), renderer.exact(scattered), renderer.exact(multiplied)
+    job = BakeJob("Floor", texture.on(receiver), scattered.illumination, surface, scattered.settings, BAKE_STEPS)
+    np.testing.assert_allclose(exact.texture, job.run().texture, rtol=1e-4, atol=1e-6)
+    mean = exact.texture.mean()
+    assert quick.texture.mean() == pytest.approx(mean, rel=0.02)
+    assert np.abs(quick.texture - exact.texture).mean() < 0.5 * np.abs(other.texture - exact.texture).mean()
 
 
 @pytest.mark.parametrize("lights", [[LAMP], [AREA]], ids=["lamp", "area"])

@@ -14,7 +14,7 @@ from ...core.errors import BakeError, text_of
 from ...core.messages import warning
 from ...core.progress import Callback, Progress
 from ...core.scene.receiver import Receiver
-from ...core.scene.texture import BaseColor
+from ...core.scene.texture import BaseColor, TextureUse
 from ...core.scene.tiles import Place
 from ...core.target import Target
 from .process import run
@@ -42,14 +42,14 @@ class BaseColorByCycles(Step):
     Attributes
     ----------
     surface : of the node, without the base color.
-    blur : fraction of the texture that light passes on its way in.
+    use : how the texture colors the surface.
     matrix : rows of the matrix of the instance that is baked; None if the object itself is.
     """
 
     copy: CopyForCycles
     target: Target
     surface: Surface
-    blur: float
+    use: TextureUse
     matrix: list | None
 
     name = "Evaluating the base color"
@@ -72,7 +72,7 @@ class BaseColorByCycles(Step):
             colors = colors_by_cycles(self.copy, self.target, self.matrix, receiver, progress)
         except (BakeError, OSError) as error:
             return not_evaluated(self.target, text_of(error))
-        return BaseColor.of(colors, receiver, self.blur, self.target.object_name)
+        return BaseColor.of(colors, receiver, self.use, self.target.object_name)
 
 
 def not_evaluated(target: Target, why: str) -> BaseColor:

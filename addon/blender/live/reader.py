@@ -19,7 +19,7 @@ from ...core.scene.flat_mesh import flatten
 from ...core.scene.illumination import Illumination
 from ...core.scene.polygons import Polygons
 from ...core.scene.receiver import Receiver, build_receiver, texture_size
-from ...core.scene.texture import BaseColor
+from ...core.scene.texture import BaseColor, TextureUse
 from ...core.target import Target
 from .. import compat
 from ..cycles.sky import SkyService
@@ -233,12 +233,13 @@ class Reader:
         def read() -> BaseColor:
             instance = find_instances(depsgraph, {target.object_name})[target.object_name]
             receiver = _receiver(polygons, size, node.surface())
-            return read_texture(node.color_input(groups), node.texture_blur, instance, receiver)
+            return read_texture(node.color_input(groups), node.texture_use(), instance, receiver)
 
         tree = scene_cache.texture(material, node.color_input(groups))
-        color = scene_cache.get(("texture", target), [material], read, tree.images, (tree.text, polygons, size))
-        blur = node.texture_blur
-        color = scene_cache.get(("blurred", target), [], lambda: _blurred(color, blur), state=(color, blur))
+        use = node.texture_use()
+        state = tree.text, polygons, size, use.is_albedo
+        color = scene_cache.get(("texture", target), [material], read, tree.images, state)
+        color = scene_cache.get(("used texture", target), [], lambda: _used(color, use), state=(color, use))
         self._colors[target] = size, color
         return color
 
@@ -255,10 +256,10 @@ def _polygons(target: Target, instance: ObjectInstance) -> Polygons:
     return scene_cache.get(key, [obj.original], read, state=state)
 
 
-def _blurred(color: BaseColor, blur: float) -> BaseColor:
-    if color.texture is None or color.texture.blur == blur:
+def _used(color: BaseColor, use: TextureUse) -> BaseColor:
+    if color.texture is None or color.texture.use == use:
         return color
-    return replace(color, texture=replace(color.texture, blur=blur))
+    return replace(color, texture=replace(color.texture, use=use))
 
 
 def _receiver(polygons: Polygons, size: Size, surface: Surface) -> Receiver:

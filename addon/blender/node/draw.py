@@ -11,6 +11,7 @@ from ...core.bake.pace import Estimate
 from ...core.bake.steps import to_simulate
 from ...core.errors import BakeError
 from ...core.ldf.library import SIMULATING
+from ...core.scene.texture import MULTIPLIED
 from ...core.target import BACK, FRONT
 from ...core.time_left import duration
 from .output import former_output, has_plain, is_in_group, is_shown
@@ -82,7 +83,11 @@ def draw_properties(node, layout) -> None:
 def _draw_color(node, layout) -> None:
     if node.has_texture():
         layout.label(text="Color: from texture", icon="TEXTURE")
-        layout.prop(node, "texture_blur")
+        layout.prop(node, "texture_method")
+        if node.texture_method == MULTIPLIED:
+            layout.prop(node, "texture_blur")
+        else:
+            layout.prop(node, "color_mode", text="Texture of")
         return
     layout.prop(node, "color_mode")
     if node.color_mode == "BASE_COLOR":

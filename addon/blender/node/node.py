@@ -9,6 +9,7 @@ from ...core.bake.surface import MIRROR, OPEN, Surface
 from ...core.errors import MaterialError
 from ...core.material import Material
 from ...core.messages import Message
+from ...core.scene.texture import MULTIPLIED, SCATTERED, TextureUse
 from ...core.target import BACK, FRONT
 from .. import compat, preferences
 from ..read.nodes import InputSocket
@@ -103,6 +104,11 @@ def _ior_edited(node, context) -> None:
     tree = own_tree(node)
     if tree is not None:
         show_ior(tree, node.ior)
+
+
+def _blur_edited(node, _context) -> None:
+    """Have the texture multiply light, which is what scripts want that set this value."""
+    node.texture_method = MULTIPLIED
 
 
 def _show_color(node) -> None:
@@ -283,6 +289,25 @@ class BeamspreadNode(ColorProperties, PathProperties, bpy.types.ShaderNodeCustom
         "bake makes",
         update=_map_edited,
     )
+    texture_method: EnumProperty(
+        name="Texture",
+        description="Choose how the texture at Base Color colors the light",
+        items=(
+            (
+                MULTIPLIED,
+                "Multiplied",
+                "As in other renderers: light of a medium of the mean color, times the texture on its way in and out",
+                0,
+            ),
+            (
+                SCATTERED,
+                "Scattered",
+                "As in nature: each texel has a medium of its own, and light takes on the colors of all that it passes",
+                1,
+            ),
+        ),
+        default=MULTIPLIED,  # that of older files
+    )
     texture_blur: FloatProperty(
         name="Texture Blur",
         description="Set how much scattering blurs the texture at Base Color. 0 = sharp, 1 = fully blurred",
@@ -290,6 +315,7 @@ class BeamspreadNode(ColorProperties, PathProperties, bpy.types.ShaderNodeCustom
         default=0.5,
         min=0.0,
         max=1.0,
+        update=_blur_edited,
     )
     former_node: StringProperty(options={"HIDDEN"}, description="Node that the material showed before the bake")
     former_socket: StringProperty(options={"HIDDEN"}, description="Output of that node")
@@ -301,6 +327,7 @@ class BeamspreadNode(ColorProperties, PathProperties, bpy.types.ShaderNodeCustom
         compat.give_new_node_its_tree(self, make_inner_tree())
         chosen = preferences.preferences()
         start(self, chosen.new_base_color if chosen else preferences.NEW_BASE_COLOR)
+        self.texture_method = SCATTERED
         self.ior = chosen.new_ior if chosen else preferences.NEW_IOR
         self.inputs[ROUGHNESS].default_value = NEW_ROUGHNESS
         if chosen:
@@ -355,6 +382,11 @@ class BeamspreadNode(ColorProperties, PathProperties, bpy.types.ShaderNodeCustom
     def has_texture(self) -> bool:
         """True if the base color comes from a link, and not from the node's own base color or albedo."""
         return BASE_COLOR in self.inputs and self.inputs[BASE_COLOR].is_linked
+
+    def texture_use(self) -> TextureUse:
+        """How a texture at the base color counts."""
+        is_albedo = self.texture_method == SCATTERED and self.color_mode == ALBEDO_MODE
+        return TextureUse(self.texture_method, self.texture_blur, is_albedo)
 
     def color_input(self, groups: tuple = ()) -> InputSocket:
         """The input for a texture, inside the group nodes around the node, outermost first."""

@@ -188,6 +188,7 @@ def _take_color(node, inputs: _Inputs, name: str, value=None) -> tuple[float, ..
     source = inputs.source(name)
     if source is not None:
         node.id_data.links.new(node.inputs[BASE_COLOR], source)
+        node.color_mode = "BASE_COLOR"
         return (0.8, 0.8, 0.8)
     for link in list(node.inputs[BASE_COLOR].links):
         node.id_data.links.remove(link)

@@ -10,7 +10,7 @@ from ...core.errors import MissingImageError, NotSupportedError
 from ...core.messages import warning
 from ...core.scene.receiver import Receiver
 from ...core.scene.sampling import sample_positions
-from ...core.scene.texture import BaseColor
+from ...core.scene.texture import BaseColor, TextureUse
 from .image_nodes import Images
 from .nodes import Evaluator, InputSocket, Links, Source, converted, shows_bake
 from .shading import ON_NO_PATH, ShadingPoints
@@ -24,7 +24,7 @@ MAX_SIDE = 4
 
 def read_texture(
     wanted: InputSocket,
-    blur: float,
+    use: TextureUse,
     instance: ObjectInstance,
     receiver: Receiver,
     check: Callable[[], None] | None = None,
@@ -34,7 +34,7 @@ def read_texture(
     Parameters
     ----------
     wanted : input that the texture is linked to.
-    blur : fraction of the texture that light passes on its way in.
+    use : how the texture colors the surface.
     instance : mesh object, for its own coordinates.
     check : called now and then, raises an exception to cancel.
     """
@@ -48,7 +48,7 @@ def read_texture(
         return BaseColor(warnings=(warning(name, text, error.remedy),))
     except NotSupportedError as error:
         return BaseColor(unknown=str(error))
-    return BaseColor.of(colors, receiver, blur, name)
+    return BaseColor.of(colors, receiver, use, name)
 
 
 class _OnChart(ShadingPoints):

@@ -15,16 +15,9 @@ from ..scene.bent_grid import AnyGrid, BentGrid
 from ..scene.lights import STRATA, AreaLight, Light, MeshLight, WorldLight
 from .bake_settings import BakeSettings
 from .edges import texels_with_images
-from .layers import (
-    MAX_RAYS_BY_SAMPLES,
-    MIN_RAYS,
-    RAYS_PER_SAMPLE,
-    WITHOUT_MEDIUM,
-    backs_of,
-    has_back,
-    rays_per_texel,
-)
+from .layers import RAYS_PER_SAMPLE, WITHOUT_MEDIUM
 from .mean_light import mean_open_irradiance
+from .spread_light import MAX_RAYS_BY_SAMPLES, MIN_RAYS, backs_of, has_back, rays_per_texel
 from .surface import Surface
 
 # The rates are seconds of one thread, fitted to bakes by tests/bench/estimates.py. Larger: longer estimates.

@@ -20,8 +20,8 @@ from .estimate import (
     simulation_seconds,
     workloads_of,
 )
-from .layers import has_back
 from .pace import Estimate
+from .spread_light import has_back
 from .steps import Solve, needs_medium, to_simulate
 from .surface import Surface
 

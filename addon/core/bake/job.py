@@ -15,14 +15,16 @@ from ..progress import Callback, Progress, log, timed
 from ..scene.bent_grid import AnyGrid
 from ..scene.illumination import Illumination
 from ..scene.receiver import Receiver
-from ..scene.texture import BaseColor, textured
+from ..scene.texture import BaseColor
 from .bake_settings import COMBINED, BakeSettings
 from .edges import with_edges
 from .estimate import OF_WORLD, Workload, workloads_of
-from .layers import WITHOUT_MEDIUM, backs_of, has_back
+from .layers import WITHOUT_MEDIUM
 from .pace import Estimate
 from .spread import Spread
+from .spread_light import backs_of, has_back
 from .surface import Surface
+from .textured_bake import multiplied_note, why_multiplied
 
 
 class Step(ABC):
@@ -115,8 +117,13 @@ class BakeJob:
     def colored(self, color: BaseColor) -> BakeJob:
         """The job with a base color and its messages: the surface has its mean, the receiver the rest."""
         illumination, receiver = self.illumination.with_messages(*color.warnings), self.receiver
+        if color.texture is not None and color.texture.use.is_scattered:
+            why = why_multiplied(receiver, self.settings)
+            if why:
+                color = replace(color, texture=self.surface.multiplied(color.texture))
+                illumination = illumination.with_messages(multiplied_note(self.name, why))
         if color.texture is not None:
-            receiver = textured(receiver, color.texture.colors, color.texture.blur)
+            receiver = replace(color.texture, receiver=receiver).on(receiver)
         return replace(self, illumination=illumination, receiver=receiver, surface=self.surface.colored(color))
 
     @property

@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Sequence
 
 import numpy as np
 
-from ..errors import BakeError
 from ..ldf.library import library, load_source
 from ..material import Material, check_thickness
 from ..native import native
@@ -15,27 +13,17 @@ from ..progress import Callback, Progress
 from ..scene.bent_grid import AnyGrid, BentGrid
 from ..scene.illumination import Illumination
 from .bake_settings import COMBINED, DIRECTION, IRRADIANCE, BakeSettings
+from .spread_light import MAX_RAYS_BY_SAMPLES, Report, Reports, Spreading, has_back, spread
 from .surface import channel_media
 
 # Fraction of a bake's time that loading known libraries takes.
 LIBRARY_PART = 0.05
 
-# Largest relative error of a texel by the solver, see `convolve`. Larger: faster. Half a per cent is invisible.
-TOLERANCE = 5e-3
-
-# Rays from each texel to a light of a size at least, to all of them together at 4 x 4 samples at most, and with any
-# number of samples at most. More: less noise, longer bakes. 1024 rays leave .9 % of noise in a texel, 4096 .4 %.
-MIN_RAYS, MAX_RAYS, MAX_RAYS_BY_SAMPLES = 8, 1024, 4096
-
-# Bytes of irradiance that are stored until the solver sees all lights, see `bake_luminance`.
-MAX_STORED_BYTES = 512 << 20
-
 # Rays of irradiance and direction to a light of a size, for each sample of a texel. More: less noise in penumbras,
 # which no medium blurs.
 RAYS_PER_SAMPLE = 4
 
-Report = Callable[[float, float, float], None]
-"""Takes an area, the mean irradiance there, W/m^2, and the mean variance of it that is left in the result."""
+NO_REPORTS = Reports()
 
 
 def bake(
@@ -46,8 +34,7 @@ def bake(
     settings: BakeSettings,
     progress: Callback | None = None,
     bytes_for_light: int = 0,
-    report_noise: Report | None = None,
-    report_bend: Callable[[float], None] | None = None,
+    reports: Reports = NO_REPORTS,
 ) -> list[np.ndarray]:
     """Luminance of translucent planes, between which no light passes, or of a surface that bends.
 
@@ -60,8 +47,6 @@ def bake(
     thickness : in the units of the grids, 0 for a half-space.
     progress : called with 0..1, returns False to stop.
     bytes_for_light : largest memory, bytes, of the moments that the fft solver makes of light; 0: any.
-    report_noise : takes the noise of the light, averaged over the area in which the medium spreads it.
-    report_bend : takes the fraction of a surface that bends more than the libraries know.
 
     Returns
     -------
@@ -85,149 +70,9 @@ def bake(
         sources = _libraries(material, thickness, settings, media_progress, curved)
     else:
         sources = [load_source(settings.sample_folder, settings.distributions)] * 3
-    reports = {"report_noise": report_noise, "report_bend": report_bend, "is_slab": has_back(thickness, settings)}
-    return spread(grids, illumination, material, sources, settings, light_progress, bytes_for_light, **reports)
-
-
-def spread(
-    grids: Sequence[AnyGrid],
-    illumination: Illumination,
-    material: Material,
-    sources: list,
-    settings: BakeSettings,
-    progress: Callback | None = None,
-    bytes_for_light: int = 0,
-    seed: int = 0,
-    report_noise: Report | None = None,
-    rays: int = 0,
-    report_bend: Callable[[float], None] | None = None,
-    is_slab: bool = False,
-) -> list[np.ndarray]:
-    """`bake` with the LDF of each channel given; the material is checked, and `settings.quality` does not count.
-
-    `rays`: from each texel to all lights of a size together; 0: by the medium, see `rays_per_texel`. `is_slab`: light
-    on the face behind counts, see `has_back`.
-    """
-    sides = {"reflected": list(grids), **({"transmitted": backs_of(grids)} if is_slab else {})}
-    # A side without light takes no time.
-    lit = {side: there for side, there in sides.items() if illumination.reaches(there)} or {"reflected": list(grids)}
-    parts = Progress.of(progress).split([1.0] * len(lit))
-    rest = bytes_for_light, seed, report_noise, rays, report_bend
-    results = [
-        spread_side(side, there, illumination, material, sources, settings, part, *rest)
-        for (side, there), part in zip(lit.items(), parts)
-    ]
-    return [sum(on_grid[1:], start=on_grid[0]) for on_grid in zip(*results)]
-
-
-def has_back(thickness: float, settings: BakeSettings) -> bool:
-    """True if light on the face behind a surface counts: in slabs whose LDF is known on both sides."""
-    return thickness > 0 and settings.layer == COMBINED and settings.distributions == "library"
-
-
-def backs_of(grids: Sequence[AnyGrid]) -> list[AnyGrid]:
-    """The grids of the faces behind: the same texels."""
-    return [grid.flipped() for grid in grids]
-
-
-def spread_side(
-    side: str,
-    grids: Sequence[AnyGrid],
-    illumination: Illumination,
-    material: Material,
-    sources: list,
-    settings: BakeSettings,
-    progress: Callback | None = None,
-    bytes_for_light: int = 0,
-    seed: int = 0,
-    report_noise: Report | None = None,
-    rays: int = 0,
-    report_bend: Callable[[float], None] | None = None,
-) -> list[np.ndarray]:
-    """Luminance by light on one side of the grids: on their own (reflected), or on that behind (transmitted)."""
-    by_rays: dict[int, list[int]] = {}
-    for number, grid in enumerate(grids):
-        by_rays.setdefault(rays or rays_per_texel(grid, material, settings), []).append(number)
-    groups = [(count, [grids[number] for number in numbers]) for count, numbers in by_rays.items()]
-    parts = Progress.of(progress).split([float(sum(grid.texels for grid in group)) for _, group in groups])
-    rest = illumination, material, sources, settings
-    luminances: list = [None] * len(grids)
-    for (count, group), numbers, part in zip(groups, by_rays.values(), parts):
-        of_group = _spread_group(side, group, *rest, count, part, bytes_for_light, seed, report_noise, report_bend)
-        for number, luminance in zip(numbers, of_group):
-            luminances[number] = luminance
-    return luminances
-
-
-def _spread_group(
-    side: str,
-    grids: list[AnyGrid],
-    illumination: Illumination,
-    material: Material,
-    sources: list,
-    settings: BakeSettings,
-    rays: int,
-    progress: Progress,
-    bytes_for_light: int,
-    seed: int,
-    report_noise: Report | None,
-    report_bend: Callable[[float], None] | None,
-) -> list[np.ndarray]:
-    """`spread_side` for grids with as many rays to each texel."""
-
-    def report_spread(irradiance: float, variance: float) -> None:
-        if report_noise:
-            area = sum(grid.area for grid in grids)
-            report_noise(area, irradiance, variance / spread_texels(grids[0], material))
-
-    try:
-        return native.bake_luminance(
-            [grid.surface() for grid in grids],
-            illumination.arriving_lights(grids),
-            sources,
-            material.albedo,
-            material.mean_free_path,
-            settings.solver,
-            TOLERANCE,
-            samples=settings.samples,
-            rays=rays,
-            min_rays=MIN_RAYS,
-            seed=seed,
-            threads=settings.threads,
-            max_stored_bytes=MAX_STORED_BYTES,
-            memory_limit=bytes_for_light,
-            progress=progress,
-            report_noise=report_spread,
-            report_beyond=lambda shares: report_bend and report_bend(max(shares)),
-            side=side,
-        )
-    except native.MemoryLimit as error:
-        largest = max(grids, key=lambda grid: grid.texels)
-        raise BakeError(
-            f"{largest.width} x {largest.height} texels are too many: {error}.",
-            "Lower the resolution, or raise the memory limit in the add-on's preferences.",
-        ) from error
-    except ValueError as error:
-        if settings.distributions == "library":
-            raise
-        raise BakeError(f"The LDF samples in '{settings.sample_folder}' don't reach this far: {error}.") from error
-
-
-def rays_per_texel(grid: AnyGrid, material: Material, settings: BakeSettings) -> int:
-    """How many rays of each texel leave noise of a hundredth, in a penumbra, of what the medium spreads.
-
-    The noise of n low-discrepancy rays falls about as n^-5/8, from .69 for one (tests/bench/room.py). It is averaged
-    over `spread_texels`.
-    """
-    wanted = (69.0 / math.sqrt(spread_texels(grid, material))) ** (8.0 / 5.0)
-    at_four = min(max(wanted, MIN_RAYS), MAX_RAYS)
-    return min(round(at_four * (settings.samples / 4) ** 2) or 1, MAX_RAYS_BY_SAMPLES)
-
-
-def spread_texels(grid: AnyGrid, material: Material) -> float:
-    """Number of texels that the light from a point fills, about: 4 pi l^2, l the mean free path, and its own."""
-    path = min(material.mean_free_path) / max(grid.pitch_x, grid.pitch_y)
-    return 1.0 + 4.0 * math.pi * path**2
+    is_slab = has_back(thickness, settings)
+    rest = {"is_slab": is_slab, "bytes_for_light": bytes_for_light, "reports": reports}
+    return spread(grids, Spreading(illumination, material, sources, settings, **rest), light_progress)
 
 
 def _libraries(material: Material, thickness: float, settings: BakeSettings, progress: Progress, curved: bool) -> list:
@@ -279,21 +124,18 @@ def mean_direction(flow: np.ndarray) -> np.ndarray:
 
 
 Layer = Callable[
-    [Sequence[AnyGrid], Illumination, Material, float, BakeSettings, Progress, int, Report, Callable], list[np.ndarray]
+    [Sequence[AnyGrid], Illumination, Material, float, BakeSettings, Progress, int, Reports], list[np.ndarray]
 ]
 """Takes the arguments of `bake`; float32 (height, width, 3) of each grid, row 0 at the bottom."""
 
 
-def irradiance(
-    grids, illumination, _material, _thickness, settings, progress, _bytes_for_light, report, _bend=None
-) -> list:
-    return [irradiance for irradiance, _ in _arrive_on_all(grids, illumination, settings, progress, report)]
+def irradiance(grids, illumination, _material, _thickness, settings, progress, _bytes_for_light, reports) -> list:
+    return [irradiance for irradiance, _ in _arrive_on_all(grids, illumination, settings, progress, reports.noise)]
 
 
-def direction(
-    grids, illumination, _material, _thickness, settings, progress, _bytes_for_light, report, _bend=None
-) -> list:
-    return [mean_direction(flow) for _, flow in _arrive_on_all(grids, illumination, settings, progress, report)]
+def direction(grids, illumination, _material, _thickness, settings, progress, _bytes_for_light, reports) -> list:
+    flows = _arrive_on_all(grids, illumination, settings, progress, reports.noise)
+    return [mean_direction(flow) for _, flow in flows]
 
 
 def _arrive_on_all(grids, illumination, settings, progress, report) -> list[tuple[np.ndarray, np.ndarray]]:

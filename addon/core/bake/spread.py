@@ -5,13 +5,12 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable
 from dataclasses import dataclass
-from functools import lru_cache
 
 import numpy as np
 
-from ..ldf.albedo import MAX_ALBEDO
+from ..ldf.reflectance_table import exact_table
+from ..material import MAX_ALBEDO
 from ..messages import Message, note
-from ..native import native
 from ..scene.flat_mesh import FlatMesh
 from ..scene.polygons import Polygons
 from .surface import MIRROR, Surface, channel_media
@@ -35,9 +34,6 @@ MAX_OFFERED = 8192
 # Part of an image that a new UV map fills, about. Larger: coarser new images.
 FILLED = 0.6
 
-# Number of albedos between which reflectances are interpolated. More: slower and more exact.
-ALBEDOS = 24
-
 
 def spread_lengths(surface: Surface) -> list[float]:
     """Diffuse mean free path of each channel, scene units: far from where it entered, light falls to 1 / e in it.
@@ -59,22 +55,7 @@ def _albedo(surface: Surface) -> list[float]:
     if surface.base_color is None:
         return [min(albedo, MAX_ALBEDO) for albedo in surface.material.albedo]
     media = channel_media(surface.material, surface.thickness)
-    return [_albedo_of(color, medium) for color, medium in zip(surface.base_color, media)]
-
-
-def _albedo_of(color: float, medium) -> float:
-    roots, reflectances = _reflectances(medium)
-    return 1 - float(np.interp(color, reflectances, roots)) ** 2
-
-
-@lru_cache(maxsize=64)
-def _reflectances(medium) -> tuple[np.ndarray, np.ndarray]:
-    """sqrt(1 - albedo), in which it is almost linear, and the reflectance under uniform diffuse light, increasing."""
-    roots = np.linspace(1.0, (1 - MAX_ALBEDO) ** 0.25, ALBEDOS) ** 2  # closer to each other for bright media
-    nodes, weights = np.polynomial.legendre.leggauss(8)
-    cosines = (nodes + 1) / 2
-    reflected, _ = native.exact_totals(medium, np.degrees(np.arccos(cosines)).tolist(), (1 - roots**2).tolist())
-    return roots, (weights * cosines) @ reflected
+    return [float(exact_table(medium).albedo(color)) for color, medium in zip(surface.base_color, media)]
 
 
 def spread_over_edges(surface: Surface) -> float:

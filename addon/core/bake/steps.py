@@ -18,7 +18,9 @@ from .estimate import simulation_seconds
 from .finish import finished_texture
 from .job import BakeJob, Step
 from .layers import LAYERS, WITHOUT_MEDIUM
+from .spread_light import Reports
 from .surface import Surface
+from .textured_bake import FINAL_EFFORT, NOISY, noisy_note
 
 SUNS, NARROW, WIDE = range(3)
 """Kinds of light: suns alone; one direction at each texel; any other."""
@@ -113,7 +115,7 @@ class Solve(Step):
             material = job.surface.resolve(settings.quality, None, settings.threads)
         grids, messages = with_edges([chart.grid for chart in job.receiver.charts], job.surface, job.name)
         job = replace(job, illumination=job.illumination.with_messages(*messages))
-        noise, bends = NoiseSum(), [0.0]
+        noise, bends, textures = NoiseSum(), [0.0], [0.0]
         values = LAYERS[settings.layer](
             grids,
             job.illumination,
@@ -122,12 +124,13 @@ class Solve(Step):
             settings,
             progress,
             self._bytes_for_light(job),
-            noise.add,
-            bends.append,
+            Reports(noise.add, bends.append, textures.append),
         )
         if job.receiver.is_bent:
             limits = bent_messages(job.name, job.surface, settings, max(bends))
             job = replace(job, illumination=job.illumination.with_messages(*limits))
+        if max(textures) > NOISY * FINAL_EFFORT.noise:
+            job = replace(job, illumination=job.illumination.with_messages(noisy_note(job.name, max(textures))))
         if noise.relative() > MAX_NOISE:
             job = replace(job, illumination=job.illumination.with_messages(_noisy(job.name, noise.relative())))
         if not all(np.isfinite(on_grid).all() for on_grid in values):

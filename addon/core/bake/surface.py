@@ -8,10 +8,12 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from ..ldf.albedo import albedo_from_color, albedo_from_reflectance
+from ..ldf.reflectance_table import exact_table
 from ..material import RGB, Material, check_base_color, check_thickness
 from ..native import native
 from ..progress import Callback, Progress
-from ..scene.texture import BaseColor
+from ..recent import keep_with
+from ..scene.texture import MULTIPLIED, BaseColor, Texture, TextureUse, mean_color
 
 OPEN, MIRROR = "OPEN", "MIRROR"
 """Edges of a plane: light leaves through them, or returns as from mirrors."""
@@ -41,7 +43,30 @@ class Surface:
 
     def colored(self, color: BaseColor) -> Surface:
         """The surface with the mean of a base color, or unchanged if the color is unknown."""
-        return self if color.mean is None else replace(self, base_color=color.mean)
+        texture = color.texture
+        if texture is None:
+            return self
+        if not texture.use.is_albedo:
+            return replace(self, base_color=color.mean)
+        mean = keep_with(texture.colors[0], tuple(self.media()), lambda: self._mean_reflectance(texture))
+        return replace(self, base_color=mean)
+
+    def _mean_reflectance(self, texture: Texture) -> RGB:
+        return mean_color(texture.receiver, self.base_colors(texture))
+
+    def base_colors(self, texture: Texture) -> tuple[np.ndarray, ...]:
+        """Base colors of a texture on each chart, float32 (H, W, 3): of albedos the colors that these give."""
+        if not texture.use.is_albedo:
+            return texture.colors
+        tables = [exact_table(medium) for medium in channel_media(self.material, self.thickness)]
+        return tuple(
+            np.stack([table.reflectance(values[..., c]) for c, table in enumerate(tables)], -1).astype(np.float32)
+            for values in texture.colors
+        )
+
+    def multiplied(self, texture: Texture) -> Texture:
+        """The texture as one that multiplies light."""
+        return replace(texture, colors=self.base_colors(texture), use=TextureUse(MULTIPLIED))
 
     def check(self) -> None:
         """Raise MaterialError for values outside their range."""

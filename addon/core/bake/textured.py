@@ -12,6 +12,7 @@ from ..arrays import float_array
 from ..ldf.reflectance_table import ReflectanceTable, reflectance_table
 from ..native import native
 from ..progress import Progress
+from .directions import Beams, beams_of
 
 NOISE = 0.01
 """Wanted root mean square error of a texel, relative to the mean. Smaller: longer."""
@@ -21,12 +22,6 @@ MAX_WALKS = 4096
 
 LEAST_FACTOR = 0.1
 """Smallest factor by which the convention multiplies light. Smaller: the ratio to the truth has more noise in black."""
-
-NARROW = 2.0
-"""Directions within this many degrees count as one. Larger: fewer paths, and light that goes another way."""
-
-RANGE = 0.05
-"""Fraction of the light that may lie beyond the outermost directions of paths. Larger: nearer to most of the light."""
 
 SOLVER_PART = 0.3
 """Fraction of the time that the convention takes."""
@@ -65,42 +60,16 @@ def textured_luminance(
         (np.broadcast_to(light[..., None], (*light.shape, 3)) if light.ndim == 2 else light, way)
         for light, way in lights
     ]
-    shape = lights[0][0].shape
-    albedos = checked_map(albedo, shape)
+    albedos = checked_map(albedo, lights[0][0].shape)
     solving, correcting = progress.split([SOLVER_PART, 1 - SOLVER_PART])
-    channels = [TexturedMedium.of(reflectance_table(source), albedos[..., c]) for c, source in enumerate(sources)]
-    factors = np.stack([channel.factor for channel in channels], -1)
+    tables = [reflectance_table(source) for source in sources]
+    channels = [Convention.of([table.reflectance(albedos[..., c])], table) for c, table in enumerate(tables)]
+    factors = np.stack([channel.factors[0] for channel in channels], -1)
     entering = [(np.ascontiguousarray(light * factors), way) for light, way in lights]
-    result = convention(entering, [channel.albedo for channel in channels], solving) * factors
-    parts, worst = beams_of(lights), 0.0
-    for c, (channel, part) in enumerate(zip(channels, correcting.split([1.0] * 3))):
-        like = [
-            before
-            for before in range(c)
-            if sources[before] is sources[c]
-            and mean_free_path[before] == mean_free_path[c]
-            and np.array_equal(albedos[..., before], albedos[..., c])
-            and all(np.array_equal(light[..., before], light[..., c]) for light, _ in lights)
-        ]
-        if like:
-            result[..., c] = result[..., like[0]]
-        if like or channel.is_even:
-            continue
-        result[..., c], error, _ = native.textured(
-            sources[c].medium,
-            tuple(mean_free_path[c] / np.asarray(pitch)),
-            np.ascontiguousarray(albedos[..., c]),
-            channel.factor,
-            channel.albedo,
-            np.ascontiguousarray(result[..., c]),
-            [(np.ascontiguousarray(light[..., c]), way) for light, way in parts],
-            side,
-            noise,
-            MAX_WALKS,
-            threads=threads,
-            progress=part,
-        )
-        worst = max(worst, error)
+    means = tuple(channel.albedo for channel in channels)
+    result = convention(entering, means, solving) * factors
+    plane = TexturedPlane(sources, albedos, factors, means, mean_free_path, pitch)
+    worst = plane.correct(result, beams_of(lights), side, noise, MAX_WALKS, threads, correcting)
     if report_noise:
         report_noise(worst)
     return result
@@ -117,96 +86,97 @@ def checked_map(albedo: ArrayLike, shape: tuple[int, ...]) -> NDArray[np.float32
 
 
 @dataclass(frozen=True, eq=False)
-class TexturedMedium:
+class Convention:
     """The usual convention for one channel: one albedo, and a factor for light that enters and for light that leaves.
 
     Attributes
     ----------
     albedo : of the mean reflectance.
-    factor : float32 (H, W), the root of the reflectance over its mean.
-    is_even : True if all texels have the same albedo.
+    factors : float32 (H, W) of each plane, the root of the reflectance over its mean.
     """
 
     albedo: float
-    factor: NDArray[np.float32]
-    is_even: bool
+    factors: list[NDArray[np.float32]]
 
     @classmethod
-    def of(cls, table: ReflectanceTable, albedo: NDArray[np.float32]) -> TexturedMedium:
-        if (albedo == albedo.flat[0]).all():
-            return cls(float(albedo.flat[0]), np.ones_like(albedo), True)
-        reflectance = table.reflectance(albedo)
-        mean = reflectance.mean()
-        factor = np.sqrt(np.maximum(reflectance / mean, LEAST_FACTOR**2))
-        return cls(float(table.albedo(mean)), factor.astype(np.float32), False)
+    def of(
+        cls, reflectances: Sequence[NDArray], table: ReflectanceTable, weights: Sequence[NDArray] | None = None
+    ) -> Convention:
+        """From reflectances (H, W) of planes that share a medium, and weights of their texels."""
+        weights = weights or [np.ones(1)] * len(reflectances)
+        shares = [np.broadcast_to(weight, values.shape) for weight, values in zip(weights, reflectances)]
+        total = sum(float(share.sum(dtype=float)) for share in shares)
+        mean = sum(float((share * values).sum(dtype=float)) for share, values in zip(shares, reflectances)) / total
+        floor = LEAST_FACTOR**2
+        relative = [np.maximum(values / mean, floor) if mean > 0 else np.ones_like(values) for values in reflectances]
+        return cls(float(table.albedo(mean)), [np.sqrt(values).astype(np.float32) for values in relative])
 
 
-def beams_of(lights: Lights) -> list[tuple[NDArray[np.float32], NDArray[np.float64]]]:
-    """Light of a few directions that stands for all lights: irradiance (H, W, 3) and the direction of travel of each.
+@dataclass(frozen=True, eq=False)
+class TexturedPlane:
+    """A plane of texels in which light scatters by albedos of their own.
 
-    A light of one direction is itself. Others are split between angles from the normal and azimuths by weights that are
-    linear in between.
+    Attributes
+    ----------
+    sources : library of each channel.
+    albedo, factor : float32 (H, W, 3); the second is the convention's.
+    mean_albedo : the convention's, of each channel.
+    mean_free_path : of each channel, in the unit of `pitch`.
     """
-    if len(lights) == 1 and lights[0][1].ndim == 1:
-        return [(lights[0][0], lights[0][1].astype(float))]
-    powers = [light.sum(-1) for light, _ in lights]
-    ways = [np.broadcast_to(way, (*power.shape, 3)) for power, (_, way) in zip(powers, lights)]
-    angles = [np.degrees(np.arccos(np.clip(-way[..., 2], 0, 1))) for way in ways]
-    azimuths = [np.degrees(np.arctan2(way[..., 1], way[..., 0])) for way in ways]
-    power = np.concatenate([values.ravel() for values in powers])
-    angle = _nodes(np.concatenate([values.ravel() for values in angles]), power)
-    weights = power * np.sin(np.radians(np.concatenate([values.ravel() for values in angles])))
-    azimuth, is_whole = _azimuth_nodes(np.concatenate([values.ravel() for values in azimuths]), weights)
-    beams = []
-    for i, theta in enumerate(angle):
-        for j, phi in enumerate(azimuth):
-            total = 0.0
-            for (light, _), at, around in zip(lights, angles, azimuths):
-                part = _weight(at, angle, i) * _around(around, azimuth, j, is_whole)
-                total = total + light * part[..., None].astype(np.float32)
-            sine, cosine = np.sin(np.radians(theta)), np.cos(np.radians(theta))
-            way = np.array([sine * np.cos(np.radians(phi)), sine * np.sin(np.radians(phi)), -cosine])
-            if np.any(total):
-                beams.append((total, way))
-    return beams
 
+    sources: Sequence[native.LdfLibrary]
+    albedo: NDArray[np.float32]
+    factor: NDArray[np.float32]
+    mean_albedo: Sequence[float]
+    mean_free_path: Sequence[float]
+    pitch: Sequence[float]
 
-def _nodes(values: NDArray, weights: NDArray) -> list[float]:
-    """One or two values between which nearly all of the weight lies."""
-    low, high = _quantiles(values, weights)
-    return [(low + high) / 2] if high - low < NARROW else [low, high]
+    def correct(
+        self,
+        luminance: NDArray[np.float32],
+        beams: Beams,
+        side: str,
+        noise: float,
+        max_walks: int,
+        threads: int,
+        progress: Progress,
+    ) -> float:
+        """Correct the convention's luminance (H, W, 3) in place; the estimated noise, relative to the mean."""
+        worst = 0.0
+        for c, part in enumerate(progress.split([1.0] * 3)):
+            like = [before for before in range(c) if self._is_like(before, c, beams)]
+            if like:
+                luminance[..., c] = luminance[..., like[0]]
+            if like or self._is_even(c) or not beams:
+                continue
+            luminance[..., c], error, _ = native.textured(
+                self.sources[c].medium,
+                tuple(self.mean_free_path[c] / np.asarray(self.pitch)),
+                np.ascontiguousarray(self.albedo[..., c]),
+                np.ascontiguousarray(self.factor[..., c]),
+                self.mean_albedo[c],
+                np.ascontiguousarray(luminance[..., c]),
+                [(np.ascontiguousarray(light[..., c]), way) for light, way in beams],
+                side,
+                noise,
+                max_walks,
+                threads=threads,
+                progress=part,
+            )
+            worst = max(worst, error)
+        return worst
 
+    def _is_even(self, c: int) -> bool:
+        """True if the convention is the truth: all texels have its albedo."""
+        albedo = self.albedo[..., c]
+        return bool((albedo == albedo.flat[0]).all() and (self.factor[..., c] == 1).all())
 
-def _quantiles(values: NDArray, weights: NDArray) -> tuple[float, float]:
-    order = np.argsort(values)
-    below = np.cumsum(weights[order])
-    if not below[-1] > 0:
-        return 0.0, 0.0
-    at = np.searchsorted(below, below[-1] * np.array([RANGE, 1 - RANGE]))
-    low, high = values[order][np.minimum(at, len(values) - 1)]
-    return float(low), float(high)
-
-
-def _azimuth_nodes(values: NDArray, weights: NDArray) -> tuple[list[float], bool]:
-    """Azimuths, degrees, ascending; True if they go around."""
-    turns = np.exp(1j * np.radians(values))
-    middle = np.degrees(np.angle((weights * turns).sum()))
-    low, high = _quantiles((values - middle + 180) % 360 - 180, weights)
-    if high - low < NARROW:
-        return [middle + (low + high) / 2], False
-    if high - low <= 180:
-        return [middle + low, middle + (low + high) / 2, middle + high], False
-    return [middle + turn for turn in (0.0, 90.0, 180.0, 270.0)], True
-
-
-def _weight(values: NDArray, nodes: list[float], number: int) -> NDArray:
-    """Weight of a node: linear between neighbors, and 1 in all beyond the ends."""
-    return np.interp(values, nodes, np.eye(len(nodes))[number]) if len(nodes) > 1 else np.ones_like(values)
-
-
-def _around(values: NDArray, nodes: list[float], number: int, is_whole: bool) -> NDArray:
-    if is_whole:
-        turn = (values - nodes[number] + 180) % 360 - 180
-        return np.maximum(1 - np.abs(turn) / 90, 0)
-    middle = nodes[len(nodes) // 2]
-    return _weight((values - middle + 180) % 360 - 180, [node - middle for node in nodes], number)
+    def _is_like(self, c: int, other: int, beams: Beams) -> bool:
+        """True if two channels have the same light in the same medium."""
+        return (
+            self.sources[c] is self.sources[other]
+            and self.mean_free_path[c] == self.mean_free_path[other]
+            and self.mean_albedo[c] == self.mean_albedo[other]
+            and np.array_equal(self.albedo[..., c], self.albedo[..., other])
+            and all(np.array_equal(light[..., c], light[..., other]) for light, _ in beams)
+        )

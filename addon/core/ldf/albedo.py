@@ -8,13 +8,10 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..arrays import float_array
-from ..material import RGB
+from ..material import MAX_ALBEDO, RGB
 from ..native import native
 from ..progress import Callback
 from .library import library
-
-MAX_ALBEDO = 0.99999
-"""Albedo of colours that are too bright for their medium. Simulations follow light for enough scatterings up to it."""
 
 
 def albedo_from_color(

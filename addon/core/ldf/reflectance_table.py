@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from functools import lru_cache
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from ..material import MAX_ALBEDO
 from ..native import native
-from .albedo import MAX_ALBEDO
 
 NODES = 32
 """Albedos at which the library is asked. Fewer: larger errors where hardly any light returns."""
@@ -24,13 +25,18 @@ class ReflectanceTable:
     is it within 3e-5 (Chebyshev's nodes).
     """
 
-    def __init__(self, library: native.LdfLibrary) -> None:
+    def __init__(self, reflectances: Callable[[NDArray[np.float64]], ArrayLike]) -> None:
+        """`reflectances`: those of albedos (N,)."""
         ends = [(1 - MAX_ALBEDO) ** 0.5, 1.0]
-        at_roots = np.vectorize(lambda root: library.diffuse_reflectance(1 - root**2))
-        known = np.polynomial.Chebyshev.interpolate(at_roots, NODES - 1, domain=ends)
+        known = np.polynomial.Chebyshev.interpolate(lambda roots: reflectances(1 - roots**2), NODES - 1, domain=ends)
         self._roots = np.linspace(*ends, STEPS)
         # Rounding may leave the darkest end below 0.
         self._reflectances = np.maximum(np.minimum.accumulate(known(self._roots)), 0.0)
+
+    @property
+    def ends(self) -> tuple[float, float]:
+        """Least and largest reflectance."""
+        return float(self._reflectances[-1]), float(self._reflectances[0])
 
     def reflectance(self, albedo: ArrayLike) -> NDArray[np.float64]:
         """Reflectance of albedos, any shape."""
@@ -45,4 +51,15 @@ class ReflectanceTable:
 @lru_cache(maxsize=4)
 def reflectance_table(library: native.LdfLibrary) -> ReflectanceTable:
     """The table of a library; those used last are kept."""
-    return ReflectanceTable(library)
+    return ReflectanceTable(np.vectorize(library.diffuse_reflectance))
+
+
+@lru_cache(maxsize=64)
+def exact_table(medium: native.Medium) -> ReflectanceTable:
+    """The table of a medium without a simulation, by adding-doubling."""
+    nodes, weights = np.polynomial.legendre.leggauss(8)
+    cosines = (nodes + 1) / 2
+    angles = np.degrees(np.arccos(cosines)).tolist()
+    return ReflectanceTable(
+        lambda albedos: (weights * cosines) @ native.exact_totals(medium, angles, albedos.tolist())[0]
+    )

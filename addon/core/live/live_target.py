@@ -51,7 +51,7 @@ class LiveTarget:
         lights = tuple(_light_key(light) for light in self.illumination.lights)
         shadows = self.illumination.shadow_key()
         arrays = self.polygons.corners, self.polygons.uvs, self.polygons.normals, self.polygons.corner_normals
-        texture = () if self.texture is None else (self.texture.blur, *map(_key, self.texture.colors))
+        texture = () if self.texture is None else (self.texture.use, *map(_key, self.texture.colors))
         rest = (
             self.target.side,
             self.size or self.resolution,

@@ -11,8 +11,18 @@ from ..bake.bake_settings import COMBINED, BakeSettings
 from ..bake.bent_limits import bent_messages
 from ..bake.edges import with_edges
 from ..bake.finish import finished_texture, with_seams
-from ..bake.layers import has_back, spread
+from ..bake.spread_light import Reports, Spreading, has_back, spread, spread_on, spread_side
 from ..bake.surface import channel_media
+from ..bake.textured_bake import (
+    FINAL_EFFORT,
+    NOISY,
+    QUICK_EFFORT,
+    corrected,
+    multiplied_note,
+    noisy_note,
+    why_multiplied,
+    with_factors,
+)
 from ..errors import BakeError
 from ..ldf.albedo import albedo_from_reflectance
 from ..ldf.library import load_source
@@ -20,11 +30,13 @@ from ..material import Material
 from ..messages import Message
 from ..progress import Progress
 from ..recent import keep_recent
+from ..scene.bent_grid import AnyGrid
+from ..scene.chart import Chart
 from ..scene.flat_mesh import FlatMesh, flatten
 from ..scene.grid import Grid
 from ..scene.illumination import Illumination
 from ..scene.lights import Light, WorldLight
-from ..scene.receiver import build_receiver, texture_size
+from ..scene.receiver import Receiver, build_receiver, texture_size
 from ..scene.sampling import resized
 from ..target import Target
 from .bounced_layer import BOUNCED_SIDE, BouncedLayers, with_bounced, without_direct
@@ -137,18 +149,28 @@ class LiveRenderer:
         framed = self._receiver(target, self.size_of(target))
         material, sources = self._material(target)
         illumination = with_bounced(target, framed.receiver, progress)
-        rest = material, sources, target.settings, progress
         grids, edges = with_edges(
             [chart.grid for chart in framed.receiver.charts], target.surface, target.target.object_name
         )
-        name, bends = target.target.object_name, [0.0]
+        name, bends, noises = target.target.object_name, [0.0], [0.0]
         is_slab = has_back(target.surface.thickness, target.settings)
-        values = spread(grids, illumination, *rest, report_bend=bends.append, is_slab=is_slab)
+        spreading = Spreading(
+            illumination,
+            material,
+            sources,
+            target.settings,
+            is_slab,
+            reports=Reports(bend=bends.append, texture=noises.append),
+        )
+        values = spread(grids, spreading, progress)
         is_bent = self._mesh(target).is_bent
         limits = bent_messages(name, target.surface, target.settings, max(bends)) if is_bent else ()
         texture = finished_texture(framed.receiver, values, material, target.settings)
         news = [message for message in illumination.messages if message not in target.illumination.messages]
-        messages = (*self._mesh(target).messages, *edges, *limits, *news)
+        if max(noises) > NOISY * FINAL_EFFORT.noise:
+            news.append(noisy_note(name, max(noises)))
+        notes = self._texture_notes(target, framed)
+        messages = (*self._mesh(target).messages, *edges, *limits, *notes, *news)
         return Rendering(target.target, texture, framed, is_exact=True, messages=messages)
 
     def missing(self, target: LiveTarget) -> list:
@@ -199,16 +221,23 @@ class LiveRenderer:
         self, target: LiveTarget, illumination: Illumination, framed: FramedReceiver, settings: BakeSettings, progress
     ) -> np.ndarray:
         """Luminance below the surface, float32 (height, width, 3), continued around the charts."""
-        rest = *self._material(target), settings, progress
+        material, sources = self._material(target)
         is_slab = has_back(target.surface.thickness, settings)
-        grids = [replace(chart.grid, color_out=None) for chart in framed.receiver.charts]
+        grids, material = with_factors([chart.grid for chart in framed.receiver.charts], material, sources)
+        grids = [replace(grid, color_out=None) for grid in grids]
         sizes = {(grid.width, grid.height, grid.pitch_x, grid.pitch_y) for grid in grids}
         # The cache has kernels of few sizes, and of planes with light on one face.
         if len(grids) > MAX_GRIDS_APART or len(sizes) > MAX_FIELDS or framed.receiver.is_bent or is_slab:
             rays = QUICK_RAYS * max(len(illumination.lights), 1)
-            values = spread(grids, illumination, *rest, rays=rays, is_slab=is_slab)
+            spreading = Spreading(illumination, material, sources, settings, is_slab, rays=rays, effort=QUICK_EFFORT)
+            values = spread_on(grids, spreading, progress)
         else:
-            values = [self._quick_luminance(grid, illumination, *rest) for grid in grids]
+            spreading = Spreading(illumination, material, sources, settings, effort=QUICK_EFFORT)
+            values = [self._quick_luminance(grid, spreading, progress) for grid in grids]
+            values = [
+                value if grid.albedo is None else corrected("reflected", grid, value, spreading, Progress.of(progress))
+                for grid, value in zip(grids, values)
+            ]
         return framed.continued(framed.receiver.to_texture(values))
 
     def _together(self, target: LiveTarget) -> Rendering:
@@ -222,24 +251,19 @@ class LiveRenderer:
         if whole.color_out is not None:
             # At all texels, so that the texture keeps its detail.
             resized_texture = resized_texture * whole.color_out
-        return Rendering(target.target, resized_texture, whole, messages=self._mesh(target).messages)
+        messages = *self._mesh(target).messages, *self._texture_notes(target, whole)
+        return Rendering(target.target, resized_texture, whole, messages=messages)
 
-    def _quick_luminance(
-        self,
-        grid: Grid,
-        illumination: Illumination,
-        material: Material,
-        sources: list,
-        settings: BakeSettings,
-        progress,
-    ) -> np.ndarray:
+    def _quick_luminance(self, grid: Grid, spreading: Spreading, progress) -> np.ndarray:
+        """Luminance of the convention for textures."""
+        illumination, material, settings = spreading.illumination, spreading.material, spreading.settings
         lights = [light for light in illumination.lights if not light.is_behind(grid)]
         if not lights:
             return np.zeros((grid.height, grid.width, 3), np.float32)
         if _are_few_suns(lights, grid) or settings.distributions != "library":
-            return spread([grid], illumination, material, sources, settings, progress)[0]
+            return spread_side("reflected", [grid], spreading, Progress.of(progress))[0]
         medium = {
-            "ldf": sources,
+            "ldf": spreading.sources,
             "albedo": material.albedo,
             "mean_free_path": material.mean_free_path,
             "threads": settings.threads,
@@ -263,18 +287,42 @@ class LiveRenderer:
             keep_recent(self._meshes, key, (polygons, mesh), MAX_RECEIVERS)
         return self._meshes[key][1]
 
+    def _textured(self, target: LiveTarget, receiver: Receiver) -> Receiver:
+        """The receiver with the texture, and with its factors for light that enters and leaves."""
+        texture = target.texture
+        if not texture.use.is_scattered:
+            return texture.on(receiver)
+        if why_multiplied(receiver, target.settings):
+            return target.surface.multiplied(texture).on(receiver)
+        receiver = texture.on(receiver)
+        grids, _ = with_factors([chart.grid for chart in receiver.charts], *self._material(target))
+        return replace(receiver, charts=tuple(map(_with_grid, receiver.charts, grids)))
+
+    def _texture_notes(self, target: LiveTarget, framed: FramedReceiver) -> tuple[Message, ...]:
+        """Notes about a texture that can't scatter light."""
+        is_scattered = target.texture is not None and target.texture.use.is_scattered
+        why = why_multiplied(framed.receiver, target.settings) if is_scattered else ""
+        return (multiplied_note(target.target.object_name, why),) if why else ()
+
     def _receiver(self, target: LiveTarget, size: tuple[int, int]) -> FramedReceiver:
         mesh = self._mesh(target)
         side, settings = target.target.side, target.settings
         key = id(mesh), id(target.texture), side, size, settings.margin, settings.margin_type
+        is_scattered = target.texture is not None and target.texture.use.is_scattered
+        if is_scattered:  # factors depend on the medium
+            key = *key, settings.distributions, *map(id, self._material(target)[1])
         if key not in self._receivers:
             receiver = build_receiver(mesh, *size, target.target.object_name)
             receiver = with_seams(receiver, mesh, settings).seen_from(side)
             if target.texture is not None:
-                receiver = target.texture.on(receiver)
+                receiver = self._textured(target, receiver)
             framed = FramedReceiver(receiver, settings.margin)
             keep_recent(self._receivers, key, (framed, mesh, target.texture), MAX_RECEIVERS)
         return self._receivers[key][0]
+
+
+def _with_grid(chart: Chart, grid: AnyGrid) -> Chart:
+    return replace(chart, grid=grid)
 
 
 def _media(target: LiveTarget) -> list:

@@ -33,7 +33,7 @@ class BentGrid:
     areas : float32, area of the surface that each texel shows, square scene units.
     coverage : float32, fraction of each texel inside the mesh, 0..1.
     finer : texels of the baked grid along a side for each of these; 1 but in an outline.
-    owner, color_in, color_out : as of a `Grid`.
+    owner, color_in, color_out, base_color, albedo : as of a `Grid`.
     is_back : True if the normals are those of the mesh's other side.
     """
 
@@ -49,6 +49,8 @@ class BentGrid:
     color_out: np.ndarray | None = None
     owner: str = ""
     is_back: bool = False
+    base_color: np.ndarray | None = None
+    albedo: np.ndarray | None = None
 
     # Shadow rays start where texels are.
     clearance = 0.0

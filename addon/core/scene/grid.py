@@ -31,7 +31,9 @@ class Grid:
     clearance : largest distance of the mesh from the plane, scene units; shadow rays start above it.
     owner : name of the object that the plane belongs to; faces of other objects that lie on the plane cover it.
     color_in, color_out : float32 (height, width, 3), factors of entering and leaving light by the surface's texture;
-        None without a texture.
+        None without a texture that multiplies light.
+    base_color, albedo : float32 (height, width, 3) of each texel in which light scatters, either of them; None: the
+        surface has one medium.
     mirrored : distance from the borders, scene units, to which mirror images of the grid return light; 0: it leaves.
     """
 
@@ -49,6 +51,8 @@ class Grid:
     color_out: np.ndarray | None = None
     owner: str = ""
     mirrored: float = 0.0
+    base_color: np.ndarray | None = None
+    albedo: np.ndarray | None = None
 
     @property
     def texels(self) -> int:
@@ -117,7 +121,8 @@ class Grid:
         width, height = min(self.width, texels), min(self.height, texels)
         pitch = {"pitch_x": self.pitch_x * self.width / width, "pitch_y": self.pitch_y * self.height / height}
         whole = np.ones((height, width), np.float32)
-        return replace(self, width=width, height=height, coverage=whole, color_in=None, color_out=None, **pitch)
+        without = dict.fromkeys(("color_in", "color_out", "base_color", "albedo"))
+        return replace(self, width=width, height=height, coverage=whole, **without, **pitch)
 
     def mean(self, values: np.ndarray) -> float:
         """Mean of values (height, width, C) over the grid."""

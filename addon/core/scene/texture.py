@@ -1,8 +1,8 @@
-"""Textured surfaces on a medium of one color.
+"""Textured surfaces: each texel has an albedo of its own, or the texture multiplies the light of a medium of one color.
 
-The medium has the mean color. The texture multiplies light twice, where it enters and where it leaves, by the powers
-`blur` and 1 - blur of the color relative to the mean. This is the convention of renderers and no light transport, in
-which light between two points would take on the albedos of both. docs/method.md has the error.
+The second way is the convention of renderers and no light transport. The medium has the mean color. The texture
+multiplies light twice, where it enters and where it leaves, by the powers `blur` and 1 - blur of the color relative to
+the mean. docs/method.md has the error.
 """
 
 from __future__ import annotations
@@ -13,15 +13,42 @@ from functools import cached_property
 
 import numpy as np
 
-from ..messages import Message, warning
+from ..material import MAX_ALBEDO
+from ..messages import Message, note, warning
 from .chart import Chart
 from .receiver import Receiver
 from .sampling import bilinear, sample_positions
 
+SCATTERED, MULTIPLIED = "SCATTERED", "MULTIPLIED"
+"""Ways in which a texture colors a surface: light scatters in it texel by texel, or is multiplied by it."""
+
 # Largest number of samples of a finer texture along each side of a texel. More: less aliasing, more time.
 MAX_SAMPLES = 4
+# Mean albedo below which a bake says that a texture counts as albedo: it looks almost black. Larger: more notes.
+DARK_ALBEDO = 0.7
+
 # Largest base color without a warning; rounding and interpolation may exceed 1 a little.
 BRIGHTEST = 1.001
+
+
+@dataclass(frozen=True)
+class TextureUse:
+    """How a texture colors a surface.
+
+    Attributes
+    ----------
+    method : SCATTERED or MULTIPLIED.
+    blur : see `textured`; of MULTIPLIED.
+    is_albedo : True if the texture has albedos in place of base colors; of SCATTERED.
+    """
+
+    method: str = SCATTERED
+    blur: float = 0.5
+    is_albedo: bool = False
+
+    @property
+    def is_scattered(self) -> bool:
+        return self.method == SCATTERED
 
 
 def mean_color(receiver: Receiver, colors: Sequence[np.ndarray]) -> tuple[float, float, float]:
@@ -52,24 +79,36 @@ def textured(receiver: Receiver, colors: Sequence[np.ndarray], blur: float) -> R
     return replace(receiver, charts=tuple(charts))
 
 
+def scattering(receiver: Receiver, values: Sequence[np.ndarray], is_albedo: bool) -> Receiver:
+    """The receiver whose texels have these albedos, or base colors: (grid height, grid width, 3) of each chart."""
+    name = "albedo" if is_albedo else "base_color"
+    pairs = zip(receiver.charts, values)
+    charts = [replace(chart, grid=replace(chart.grid, **{name: np.float32(value)})) for chart, value in pairs]
+    return replace(receiver, charts=tuple(charts))
+
+
 @dataclass(frozen=True, eq=False)
 class Texture:
     """Colors on a receiver, for receivers with the same charts and any number of texels.
 
     Attributes
     ----------
-    colors : float32 (grid height, grid width, 3) of each of its charts, not below 0.
-    blur : see `textured`.
+    colors : float32 (grid height, grid width, 3) of each of its charts, not below 0; albedos if its use says so.
     """
 
     receiver: Receiver
     colors: tuple[np.ndarray, ...]
-    blur: float
+    use: TextureUse
 
     def on(self, receiver: Receiver) -> Receiver:
         """The receiver with the texture."""
         pairs = zip(self.receiver.charts, self.colors, receiver.charts)
-        return textured(receiver, [self._resampled(*pair, receiver) for pair in pairs], self.blur)
+        colors = self.colors
+        if receiver is not self.receiver:
+            colors = [self._resampled(*pair, receiver) for pair in pairs]
+        if self.use.is_scattered:
+            return scattering(receiver, colors, self.use.is_albedo)
+        return textured(receiver, colors, self.use.blur)
 
     def _resampled(self, chart: Chart, color: np.ndarray, target: Chart, receiver: Receiver) -> np.ndarray:
         """The colors of a chart on the grid of `target`, the same chart of `receiver`."""
@@ -97,15 +136,22 @@ class BaseColor:
     unknown: str = ""
 
     @classmethod
-    def of(cls, colors: Sequence[np.ndarray], receiver: Receiver, blur: float, object_name: str) -> BaseColor:
+    def of(cls, colors: Sequence[np.ndarray], receiver: Receiver, use: TextureUse, object_name: str) -> BaseColor:
         """From colors on a receiver, as `Texture` has them; a warning if they are above 1."""
-        warnings = ()
-        if max(color.max(initial=0) for color in colors) > BRIGHTEST:
+        texture = Texture(receiver, tuple(color.clip(0, MAX_ALBEDO if use.is_albedo else 1) for color in colors), use)
+        largest = max(color.max(initial=0) for color in colors)
+        if use.is_albedo and largest >= 1:
+            text = f"The texture of '{object_name}' has scattering albedos of 1 or more, which absorb nothing."
+            return cls(texture, (warning(object_name, text, f"They are cut to {MAX_ALBEDO}."),))
+        if use.is_albedo and max(mean_color(receiver, texture.colors)) < DARK_ALBEDO:
+            text = f"The texture of '{object_name}' counts as scattering albedo, so that the surface is dark."
+            return cls(texture, (note(object_name, text, "If it shows colors, set Color to Base Color."),))
+        if largest > BRIGHTEST:
             text = f"The Base Color of '{object_name}' is above 1 in places, which reflects more light than arrives."
-            warnings = (warning(object_name, text, "It is cut to 1."),)
-        return cls(Texture(receiver, tuple(color.clip(0, 1) for color in colors), blur), warnings)
+            return cls(texture, (warning(object_name, text, "It is cut to 1."),))
+        return cls(texture)
 
     @cached_property
     def mean(self) -> tuple[float, float, float] | None:
-        """Mean color, which the medium has; None if the colors are unknown."""
+        """Mean color, or mean albedo; None if the colors are unknown."""
         return None if self.texture is None else mean_color(self.texture.receiver, self.texture.colors)

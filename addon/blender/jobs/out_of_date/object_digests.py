@@ -153,8 +153,9 @@ def surface_values(node, _groups: tuple = (), side: str = "") -> list:
     `side`: of the target; digests of earlier versions, which knew no light on the back of slabs, have none.
     """
     surface = node.surface()
-    edges = [] if surface.edges == OPEN else [surface.edges]
-    return [repr(surface), side if surface.thickness > 0 else "", node.has_texture() and node.texture_blur, *edges]
+    edges, use = [] if surface.edges == OPEN else [surface.edges], node.texture_use()
+    texture = node.has_texture() and (use.method if use.is_scattered else use.blur)
+    return [repr(surface), side if surface.thickness > 0 else "", texture, *edges]
 
 
 def _scatters(obj) -> bool:

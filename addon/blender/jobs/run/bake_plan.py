@@ -15,9 +15,9 @@ from ....core.bake.bake_settings import COMBINED, BakeSettings
 from ....core.bake.finish import with_seams
 from ....core.bake.forecast import Finders, Forecast
 from ....core.bake.job import BakeJob
-from ....core.bake.layers import backs_of
 from ....core.bake.runner import Bake
 from ....core.bake.spread import Spread, length_of, mean_size
+from ....core.bake.spread_light import backs_of
 from ....core.bake.steps import BAKE_STEPS, needs_medium, to_simulate
 from ....core.bake.surface import Surface
 from ....core.errors import BakeError
@@ -25,7 +25,7 @@ from ....core.native import native
 from ....core.scene.flat_mesh import FlatMesh
 from ....core.scene.illumination import Illumination
 from ....core.scene.receiver import build_receiver, outline
-from ....core.scene.texture import BaseColor
+from ....core.scene.texture import BaseColor, TextureUse
 from ....core.target import FRONT, Target
 from ...cycles.colors import BaseColorByCycles, not_evaluated
 from ...cycles.cycles_light import CyclesLight
@@ -54,7 +54,7 @@ class BakePlan:
     surface : values of the node, without its linked base color.
     by_cycles : completes the illumination, which all plans share.
     color : base color that is linked to the node, or None.
-    blur : fraction of its texture that light passes on its way in.
+    use : how its texture colors the surface; None without one.
     matrix : rows of the matrix of the instance that is baked; None if the object itself is.
     """
 
@@ -66,7 +66,7 @@ class BakePlan:
     illumination: Illumination
     by_cycles: CyclesLight
     color: BaseColor | None = None
-    blur: float = 0.0
+    use: TextureUse | None = None
     matrix: list | None = None
 
     def surface_with_color(self) -> Surface:
@@ -129,7 +129,7 @@ class BakePlan:
         if copy is None:
             unknown = not_evaluated(self.target, "There is no copy of the scene.")
             return replace(job, surface=self.surface).colored(unknown)
-        step = BaseColorByCycles(copy, self.target, self.surface, self.blur, self.matrix)
+        step = BaseColorByCycles(copy, self.target, self.surface, self.use, self.matrix)
         illumination = job.illumination.with_messages(*copy.scene.warnings)
         return replace(job, illumination=illumination, steps=(step, *job.steps))
 
@@ -226,7 +226,7 @@ def _is_current(node, copy) -> bool:
 
 
 def _read_values(node) -> tuple:
-    return node.surface(), node.texture_blur, node.uv_map, node.sides()
+    return node.surface(), node.texture_use(), node.uv_map, node.sides()
 
 
 def read_plans(
@@ -305,7 +305,7 @@ def _plan(
     plan = BakePlan(target.name, "" if image is None else image.name_full, mesh, size, receiving.surface, *light)
     if not node.has_texture():
         return plan
-    receiver, blur = build_receiver(mesh, *size), node.texture_blur
-    color = read_texture(node.color_input(target.groups), blur, instance, receiver, check)
+    receiver, use = build_receiver(mesh, *size), node.texture_use()
+    color = read_texture(node.color_input(target.groups), use, instance, receiver, check)
     matrix = np.array(instance.matrix).tolist() if instance.is_instance else None
-    return replace(plan, color=color, blur=blur, matrix=matrix)
+    return replace(plan, color=color, use=use, matrix=matrix)

@@ -1,0 +1,183 @@
+"""Few directions that stand for all light on a plane.
+
+A light of about one direction keeps it. All others are split between angles from the normal and azimuths, by weights
+that are linear in between.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+NARROW = 2.0
+"""Directions within this many degrees count as one. Larger: fewer paths, and light that goes another way."""
+
+RANGE = 0.05
+"""Fraction of the light that may lie beyond the outermost directions of paths. Larger: nearer to most of the light."""
+
+MAX_OWN = 3
+"""Largest number of lights with a direction of their own. More: longer; fewer: suns that share directions."""
+
+STEEP = 6.0
+"""Angle from the normal, degrees, up to which azimuths do not count. Larger: fewer paths."""
+
+Beams = list[tuple[NDArray[np.float32], NDArray[np.float64]]]
+"""Irradiance (H, W, 3), and the direction of travel of each."""
+
+
+@dataclass(frozen=True)
+class DirectionClasses:
+    """Directions between which light is split.
+
+    Attributes
+    ----------
+    angles : from the normal, degrees, ascending: one or two.
+    azimuths : degrees, ascending.
+    is_whole : True if the azimuths go around.
+    """
+
+    angles: tuple[float, ...]
+    azimuths: tuple[float, ...]
+    is_whole: bool
+
+    @classmethod
+    def of(cls, powers: Sequence[NDArray], ways: Sequence[NDArray]) -> DirectionClasses:
+        """Classes between which nearly all of the light lies, whose power (N,) and directions (N, 3) are given."""
+        power, way = np.concatenate(powers), np.concatenate(ways)
+        angle, azimuth = _angles(way)
+        angles = _nodes(angle, power)
+        if angles[-1] < STEEP:
+            return cls(angles, (0.0,), False)
+        return cls(angles, *_azimuth_nodes(azimuth, power * np.sin(np.radians(angle))))
+
+    def ways(self) -> list[NDArray[np.float64]]:
+        """Unit vectors along which the light of each class travels, z < 0."""
+        theta, phi = (
+            values.ravel() for values in np.meshgrid(*map(np.radians, (self.angles, self.azimuths)), indexing="ij")
+        )
+        sine = np.sin(theta)
+        return list(np.stack([sine * np.cos(phi), sine * np.sin(phi), -np.cos(theta)], -1))
+
+    def weights(self, way: NDArray) -> Iterator[NDArray]:
+        """Weights (...) of each class for directions (..., 3); they add up to 1."""
+        angle, azimuth = _angles(way)
+        around = [self._around(azimuth, number) for number in range(len(self.azimuths))]
+        for number in range(len(self.angles)):
+            of_angle = _weight(angle, self.angles, number)
+            for of_azimuth in around:
+                yield (of_angle * of_azimuth).astype(np.float32)
+
+    def _around(self, values: NDArray, number: int) -> NDArray:
+        nodes = self.azimuths
+        if self.is_whole:
+            turn = (values - nodes[number] + 180) % 360 - 180
+            return np.maximum(1 - np.abs(turn) / 90, 0)
+        middle = nodes[len(nodes) // 2]
+        return _weight((values - middle + 180) % 360 - 180, [node - middle for node in nodes], number)
+
+
+def direction_of(power: NDArray, way: NDArray) -> NDArray | None:
+    """The direction of light of about one direction, from powers (...) and directions (..., 3); None for others."""
+    total = float(power.sum(dtype=float))
+    if not total > 0:
+        return None
+    mean = np.einsum("n,nc->c", power.ravel(), way.reshape(-1, 3), dtype=float) / total
+    length = float(np.linalg.norm(mean))
+    return mean / length if length > np.cos(np.radians(NARROW)) else None
+
+
+def beams_of(lights: Iterable[tuple[NDArray, NDArray]]) -> Beams:
+    """Light of a few directions that stands for all lights: irradiance (H, W, 3), and directions (3,) or (H, W, 3)."""
+    lights = list(lights)
+    surveys = [(light.sum(-1), np.broadcast_to(way, light.shape)) for light, way in lights]
+    splitter = Splitter.of(surveys)
+    for number, light in enumerate(lights):
+        splitter.add(number, *light)
+    return splitter.beams
+
+
+class Splitter:
+    """Splits lights, one after the other, between directions that a survey has chosen.
+
+    Attributes
+    ----------
+    beams : the light so far.
+    """
+
+    def __init__(self, own: dict[int, NDArray], classes: DirectionClasses | None) -> None:
+        """`own`: direction of the lights, by number, that have one of their own."""
+        self._own, self._classes = own, classes
+        self._beams: dict[object, tuple[NDArray, NDArray]] = {}
+
+    @classmethod
+    def of(cls, surveys: Sequence[tuple[NDArray, NDArray]]) -> Splitter:
+        """From powers (...) and directions (..., 3) of each light."""
+        directions = [direction_of(*survey) for survey in surveys]
+        narrow = [number for number, way in enumerate(directions) if way is not None]
+        narrow.sort(key=lambda number: -float(surveys[number][0].sum()))
+        own = {number: directions[number] for number in narrow[:MAX_OWN]}
+        rest = [survey for number, survey in enumerate(surveys) if number not in own and survey[0].any()]
+        if not rest:
+            return cls(own, None)
+        return cls(own, DirectionClasses.of([p.ravel() for p, _ in rest], [w.reshape(-1, 3) for _, w in rest]))
+
+    @property
+    def beams(self) -> Beams:
+        return [(np.ascontiguousarray(light, np.float32), way) for light, way in self._beams.values()]
+
+    def add(self, number: int, light: NDArray, way: NDArray) -> None:
+        """Add irradiance (H, W, 3) of the light with this number, with its directions (3,) or (H, W, 3)."""
+        if number in self._own:
+            self._put(("own", number), light, self._own[number])
+        elif self._classes is not None:
+            for index, (weight, of_class) in enumerate(zip(self._classes.weights(way), self._classes.ways())):
+                if np.any(weight):
+                    self._put(index, light * weight[..., None], of_class)
+
+    def _put(self, key: object, light: NDArray, way: NDArray) -> None:
+        if key in self._beams:
+            self._beams[key][0][...] += light
+        elif np.any(light):
+            self._beams[key] = np.array(light, np.float32), way
+
+
+def _angles(way: NDArray) -> tuple[NDArray, NDArray]:
+    """Angles from the normal and azimuths, degrees, of directions (..., 3) of travel."""
+    angle = np.degrees(np.arccos(np.clip(-way[..., 2], 0, 1)))
+    return angle, np.degrees(np.arctan2(way[..., 1], way[..., 0]))
+
+
+def _nodes(values: NDArray, weights: NDArray) -> tuple[float, ...]:
+    """One or two values between which nearly all of the weight lies."""
+    low, high = _quantiles(values, weights)
+    return ((low + high) / 2,) if high - low < NARROW else (low, high)
+
+
+def _quantiles(values: NDArray, weights: NDArray) -> tuple[float, float]:
+    order = np.argsort(values)
+    below = np.cumsum(weights[order], dtype=float)
+    if not below[-1] > 0:
+        return 0.0, 0.0
+    at = np.searchsorted(below, below[-1] * np.array([RANGE, 1 - RANGE]))
+    low, high = values[order][np.minimum(at, len(values) - 1)]
+    return float(low), float(high)
+
+
+def _azimuth_nodes(values: NDArray, weights: NDArray) -> tuple[tuple[float, ...], bool]:
+    """Azimuths, degrees, ascending; True if they go around."""
+    turns = np.exp(1j * np.radians(values))
+    middle = float(np.degrees(np.angle((weights * turns).sum())))
+    low, high = _quantiles((values - middle + 180) % 360 - 180, weights)
+    if high - low < NARROW:
+        return (middle + (low + high) / 2,), False
+    if high - low <= 180:
+        return (middle + low, middle + (low + high) / 2, middle + high), False
+    return tuple(middle + turn for turn in (0.0, 90.0, 180.0, 270.0)), True
+
+
+def _weight(values: NDArray, nodes: Sequence[float], number: int) -> NDArray:
+    """Weight of a node: linear between neighbors, and 1 in all beyond the ends."""
+    return np.interp(values, nodes, np.eye(len(nodes))[number]) if len(nodes) > 1 else np.ones_like(values)

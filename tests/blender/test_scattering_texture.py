@@ -1,0 +1,101 @@
+"""Textures at Base Color in which light scatters: each texel has an albedo of its own."""
+
+import bpy
+import numpy as np
+import pytest
+from beamspread import Medium, albedo_from_color, luminance
+from beamspread.blender.jobs.state import state
+from beamspread.core.material import Material
+from scenes import add_material, add_plane, add_sun, bake, node_of
+
+SIZE, SIDE, ANGLE = 48, 2.0, 30
+PATH = SIDE / SIZE
+G, IOR = 0.8, 1.4
+COLORS = (0.2, 0.3, 0.4), (0.7, 0.6, 0.65)
+
+
+@pytest.fixture
+def plane():
+    bpy.context.scene.beamspread.resolution = SIZE
+    bpy.context.scene.beamspread.margin = 0
+    add_sun(ANGLE)
+    state.forget()
+    return add_plane(material=add_material(color_mode="BASE_COLOR", mean_free_path=(PATH,) * 3, anisotropy=G, ior=IOR))
+
+
+def stripes(first, second, period=12):
+    """Stripes along the rows, float32 (SIZE, SIZE, 3)."""
+    is_first = (np.arange(SIZE) % period < period // 2)[None, :, None]
+    return np.float32(np.where(is_first, first, second)) * np.ones((SIZE, 1, 1), np.float32)
+
+
+def add_texture(material, colors):
+    """Link an image of linear colors to the node's Base Color."""
+    height, width = colors.shape[:2]
+    image = bpy.data.images.new("Colors", width, height, float_buffer=True)
+    image.colorspace_settings.name = "Non-Color"
+    image.pixels.foreach_set(np.dstack([colors, np.ones((height, width, 1))]).astype(np.float32).ravel())
+    node = material.node_tree.nodes.new("ShaderNodeTexImage")
+    node.image, node.interpolation = image, "Closest"
+    material.node_tree.links.new(node_of(material).inputs["Base Color"], node.outputs["Color"])
+    return image
+
+
+def expected(albedo, thickness=np.inf):
+    """The same by a script."""
+    turned = np.radians(ANGLE)
+    medium = Material(albedo=(0.5,) * 3, mean_free_path=(PATH,) * 3, anisotropy=G, ior=IOR)
+    light = np.full(albedo.shape[:2], np.cos(turned), np.float32)
+    way = np.sin(turned), 0.0, -np.cos(turned)
+    return [luminance(light, (sign * way[0], 0.0, way[2]), medium, PATH, thickness, albedo=albedo) for sign in (1, -1)]
+
+
+def distance(ours, truth):
+    """Mean difference over the mean."""
+    return float(np.abs(ours - truth).mean() / truth.mean())
+
+
+def nearest(ours, truths):
+    return min(distance(ours, truth) for truth in truths)
+
+
+# Both have noise of up to 2 % and 1 %, root mean square: the mean distance is below that of both together.
+SAME = 0.02
+
+
+def test_a_new_node_scatters_light_by_the_albedo_of_each_texel(plane):
+    """As `luminance` of the albedos that give the colors; the convention is off by several times the bound."""
+    material = plane.data.materials[0]
+    add_texture(material, stripes(*COLORS))
+    albedo = stripes(*(albedo_from_color(color, Medium(G, IOR)) for color in COLORS))
+    truths = expected(albedo)
+    assert node_of(material).texture_method == "SCATTERED"
+    assert nearest(bake(plane)[0], truths) < SAME
+    assert state.lines() == []
+    node_of(material).texture_method = "MULTIPLIED"
+    assert nearest(bake(plane)[0], truths) > 3 * SAME
+
+
+def test_with_albedos_the_texture_is_the_albedo_itself(plane):
+    material = plane.data.materials[0]
+    albedo = stripes((0.6, 0.9, 0.5), (0.95, 0.99, 0.8))
+    add_texture(material, albedo)
+    node_of(material).color_mode = "ALBEDO"
+    assert nearest(bake(plane)[0], expected(albedo)) < SAME
+
+
+def test_albedos_of_one_are_cut_and_said(plane):
+    material = plane.data.materials[0]
+    add_texture(material, stripes((0.5,) * 3, (1.0,) * 3))
+    node_of(material).color_mode = "ALBEDO"
+    found = bake(plane)[0]
+    assert np.isfinite(found).all()
+    assert found.min() >= 0
+    assert "cut to 0.99999" in state.lines()[0]
+
+
+def test_setting_the_blur_chooses_the_convention():
+    """As scripts do that know no other way."""
+    node = node_of(add_material())
+    node.texture_blur = 0.2
+    assert node.texture_method == "MULTIPLIED"
