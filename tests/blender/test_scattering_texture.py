@@ -59,8 +59,8 @@ def nearest(ours, truths):
     return min(distance(ours, truth) for truth in truths)
 
 
-# Both have noise of up to 2 % and 1 %, root mean square: the mean distance is below that of both together.
-SAME = 0.02
+# Noise of up to 2 and 1 %, root mean square: the mean distance is below that of both together.
+SAME = 0.025
 
 
 def test_a_new_node_scatters_light_by_the_albedo_of_each_texel(plane):
@@ -78,7 +78,7 @@ def test_a_new_node_scatters_light_by_the_albedo_of_each_texel(plane):
 
 def test_with_albedos_the_texture_is_the_albedo_itself(plane):
     material = plane.data.materials[0]
-    albedo = stripes((0.6, 0.9, 0.5), (0.95, 0.99, 0.8))
+    albedo = stripes((0.8, 0.9, 0.85), (0.95, 0.99, 0.97))
     add_texture(material, albedo)
     node_of(material).color_mode = "ALBEDO"
     assert nearest(bake(plane)[0], expected(albedo)) < SAME

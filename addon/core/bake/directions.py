@@ -53,6 +53,13 @@ class DirectionClasses:
             return cls(angles, (0.0,), False)
         return cls(angles, *_azimuth_nodes(azimuth, power * np.sin(np.radians(angle))))
 
+    @classmethod
+    def mean(cls, powers: Sequence[NDArray], ways: Sequence[NDArray]) -> DirectionClasses:
+        """One class, of the mean direction."""
+        mean = np.einsum("n,nc->c", np.concatenate(powers), np.concatenate(ways), dtype=float)
+        angle, azimuth = _angles(mean / np.linalg.norm(mean))
+        return cls((float(angle),), (float(azimuth),), False)
+
     def ways(self) -> list[NDArray[np.float64]]:
         """Unit vectors along which the light of each class travels, z < 0."""
         theta, phi = (
@@ -113,16 +120,17 @@ class Splitter:
         self._beams: dict[object, tuple[NDArray, NDArray]] = {}
 
     @classmethod
-    def of(cls, surveys: Sequence[tuple[NDArray, NDArray]]) -> Splitter:
-        """From powers (...) and directions (..., 3) of each light."""
+    def of(cls, surveys: Sequence[tuple[NDArray, NDArray]], max_own: int = MAX_OWN, is_split: bool = True) -> Splitter:
+        """From powers (...) and directions (..., 3) of each light; not `is_split`: others have their mean one."""
         directions = [direction_of(*survey) for survey in surveys]
         narrow = [number for number, way in enumerate(directions) if way is not None]
         narrow.sort(key=lambda number: -float(surveys[number][0].sum()))
-        own = {number: directions[number] for number in narrow[:MAX_OWN]}
+        own = {number: directions[number] for number in narrow[:max_own]}
         rest = [survey for number, survey in enumerate(surveys) if number not in own and survey[0].any()]
         if not rest:
             return cls(own, None)
-        return cls(own, DirectionClasses.of([p.ravel() for p, _ in rest], [w.reshape(-1, 3) for _, w in rest]))
+        powers, ways = [power.ravel() for power, _ in rest], [way.reshape(-1, 3) for _, way in rest]
+        return cls(own, DirectionClasses.of(powers, ways) if is_split else DirectionClasses.mean(powers, ways))
 
     @property
     def beams(self) -> Beams:

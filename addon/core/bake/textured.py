@@ -20,6 +20,10 @@ NOISE = 0.01
 MAX_WALKS = 4096
 """Largest number of walks for each texel. More: less noise where albedos differ most, and longer."""
 
+SURVIVAL_POWER, LONG_WALK, MOST_SHORT = 1.5, 30.0, 8.0
+"""Walks go on with this power of the brightest albedo. Those of fewer scatterings than the second number may be more,
+by up to the third: dark textures return few of them. Larger: less noise there, longer."""
+
 LEAST_FACTOR = 0.1
 """Smallest factor by which the convention multiplies light. Smaller: the ratio to the truth has more noise in black."""
 
@@ -159,12 +163,17 @@ class TexturedPlane:
                 [(np.ascontiguousarray(light[..., c]), way) for light, way in beams],
                 side,
                 noise,
-                max_walks,
+                round(max_walks * self._shortness(c)),
                 threads=threads,
                 progress=part,
             )
             worst = max(worst, error)
         return worst
+
+    def _shortness(self, c: int) -> float:
+        """Multiple of walks that a channel may have, since its walks are shorter than bright ones."""
+        length = 1 / (1 - float(self.albedo[..., c].max()) ** SURVIVAL_POWER)
+        return min(max(LONG_WALK / length, 1.0), MOST_SHORT)
 
     def _is_even(self, c: int) -> bool:
         """True if the convention is the truth: all texels have its albedo."""

@@ -20,7 +20,7 @@ from ..scene.lights import Light, WorldLight
 from ..scene.receiver import Receiver
 from ..scene.sampling import resized
 from .bake_settings import DIRECTION, IRRADIANCE, BakeSettings
-from .directions import Beams, Splitter
+from .directions import MAX_OWN, Beams, Splitter
 from .textured import Convention, TexturedPlane
 
 if TYPE_CHECKING:
@@ -39,9 +39,6 @@ WORLD_ROWS = 512
 # Smaller: faster, and light that goes another way.
 PARALLEL = 0.99
 
-# Walks of each beam for each texel, at least. More: less noise of many beams, longer.
-MIN_WALKS = 8
-
 # Least cosine of light's angle from the normal. Smaller: longer paths along the surface.
 GRAZING = 0.05
 
@@ -53,24 +50,28 @@ class Effort:
     Attributes
     ----------
     noise : wanted root mean square error of a texel, relative to the mean. Smaller: longer.
-    max_walks : largest number of walks for each texel, of all beams together. More: less noise, longer.
+    max_walks : largest number of walks for each texel. More: less noise, longer.
     texels : along a side at which light is gathered for paths. More: sharper shadows in the correction, longer.
     rays : from each of these texels to a light of a size.
+    max_own : largest number of lights with a direction of their own.
+    is_split : True if the light of all others is split between directions; else it has its mean one.
     """
 
     noise: float
     max_walks: int
     texels: int
     rays: int
+    max_own: int = MAX_OWN
+    is_split: bool = True
 
 
-QUICK_EFFORT = Effort(0.1, 32, 128, 4)
+QUICK_EFFORT = Effort(0.1, 32, 128, 4, max_own=1, is_split=False)
 """Effort of Live while the scene changes."""
 
-NOISY = 1.5
+NOISY = 2.0
 """Noise of a texture, over the wanted one, above which a bake names it."""
 
-FINAL_EFFORT = Effort(0.02, 4096, 512, 8)
+FINAL_EFFORT = Effort(0.02, 2048, 512, 8)
 """Effort of bakes."""
 
 
@@ -150,8 +151,7 @@ def corrected(side: str, grid: AnyGrid, luminance: NDArray, spreading: Spreading
     pitch = grid.pitch_x, grid.pitch_y
     plane = TexturedPlane(spreading.sources, albedo, factor, material.albedo, material.mean_free_path, pitch)
     beams = _mirrored_beams(beams, pad)
-    walks = max(effort.max_walks // max(len(beams), 1), MIN_WALKS)
-    noise = plane.correct(result, beams, side, effort.noise, walks, settings.threads, progress)
+    noise = plane.correct(result, beams, side, effort.noise, effort.max_walks, settings.threads, progress)
     if spreading.reports.texture:
         spreading.reports.texture(noise)
     return np.ascontiguousarray(result[rows, columns])
@@ -207,7 +207,7 @@ def arriving_beams(grid: AnyGrid, illumination: Illumination, settings: BakeSett
                 np.concatenate([way.reshape(-1, 3) for _, way in rays]),
             )
         )
-    splitter = Splitter.of(surveys)
+    splitter = Splitter.of(surveys, effort.max_own, effort.is_split)
     for number, light in enumerate(coarse):
         for part, way in _rays(target, light, lights, settings, effort.rays):
             splitter.add(number, part, way)
