@@ -8,7 +8,6 @@
 
 #include <algorithm>
 #include <array>
-#include <bit>
 #include <cmath>
 #include <cstring>
 #include <limits>
@@ -23,8 +22,6 @@ using Lanes = float __attribute__((vector_size(lanes_per_block * sizeof(float)))
 using Harmonics8 = float __attribute__((vector_size(surface_harmonics * sizeof(float))));
 using Indices8 = std::int32_t __attribute__((vector_size(surface_harmonics * sizeof(std::int32_t))));
 static_assert(lanes_per_block == 2 * surface_harmonics);
-
-constexpr std::size_t max_results = 3;
 
 // Length of a chord in the tangent plane, over the chord, below which harmonics fade. Larger: smoother where light
 // crosses edges, less exact around balls.
@@ -73,8 +70,8 @@ constexpr float steep = 0.5f;
 #else
     std::array<Indices8, 2> half;
     std::memcpy(half.data(), harmonic, sizeof(half));
-    const std::array<Harmonics8, 2> parts = {__builtin_shuffle(values, half[0]), __builtin_shuffle(values, half[1])};
-    std::memcpy(&lanes, parts.data(), sizeof(lanes));
+    lanes = __builtin_shufflevector(__builtin_shuffle(values, half[0]), __builtin_shuffle(values, half[1]), 0, 1, 2, 3,
+                                    4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15);
 #endif
 }
 
@@ -82,144 +79,241 @@ constexpr float steep = 0.5f;
 // alone moves it. Larger: less time where a surface hardly bends, larger errors.
 constexpr float least_part = 1e-4f;
 
-// Rows of a table around a chord and a curvature, and their weights.
-struct Rows {
-    std::size_t first;  // index of the value of the lower chord and curvature
-    std::size_t to_next;  // to that of the next chord
-    std::size_t to_high;  // to that of the next curvature
-    std::array<float, 4> weight;  // 0 for the next curvature at a node
+// Old processors have one function for any number of results: less code.
+constexpr bool is_plain = HWY_TARGET == HWY_SCALAR;
+
+// A value of each target.
+using Floats = float __attribute__((vector_size(PairTargets::most * sizeof(float))));
+using Integers = std::int32_t __attribute__((vector_size(PairTargets::most * sizeof(std::int32_t))));
+
+[[gnu::always_inline]] inline void load_targets(const std::array<float, PairTargets::most>& from, Floats& to)
+{
+    std::memcpy(&to, from.data(), sizeof(to));
+}
+
+[[gnu::always_inline]] inline void find_roots(Floats& values)
+{
+    std::array<float, PairTargets::most> roots;
+    std::memcpy(roots.data(), &values, sizeof(values));
+    for (float& root : roots)
+        root = std::sqrt(root);
+    std::memcpy(&values, roots.data(), sizeof(values));
+}
+
+// Pairs of one source and all targets.
+struct Pairs {
+    Floats chord;
+    Integers is_disk;
+    Integers step;      // of the chord, after the first row
+    Floats part;        // of the way from its first chord to the next
+    Floats per_square;  // 1 / chord^2
+    Floats curvature;
+    Floats cosine;  // of the chord's azimuth in the tangent plane of the source, times the fade
+    Floats sine;
 };
 
-template <std::size_t results, bool are_clusters>
-void add_pairs_of(const PairTables& tables, const PairTarget& target, std::span<const PairSource> sources,
-                  const float* moments, std::size_t stride, float* sums, float& beyond)
+// Rows of a table around a chord and a curvature, and their weights, for each target.
+struct Rows {
+    std::array<std::uint32_t, PairTargets::most> first;    // the value of the lower chord and curvature
+    std::array<std::uint32_t, PairTargets::most> to_high;  // to that of the next curvature
+    std::array<Floats, 4> weight;                          // 0 for the next curvature at a node
+    std::array<float, PairTargets::most> to_next;
+};
+
+// `target` has positions, then normals.
+[[gnu::always_inline]] inline void find_pairs(const PairTables& tables, const std::array<Floats, 6>& target,
+                                              const PairSource& source, bool is_cluster, Pairs& pairs)
 {
-    // Value at the place of some rows in a table.
-    const auto interpolate = [](const Rows& rows, bool at_node, const float* values, Lanes& value)
-                                 __attribute__((always_inline)) {
-                                     const float* first = values + rows.first;
-                                     std::array<Lanes, 2> row;
-                                     load(first, row[0]);
-                                     load(first + rows.to_next, row[1]);
-                                     value = row[0] * rows.weight[0] + row[1] * rows.weight[1];
-                                     if (at_node)
-                                         return;
-                                     const float* high = first + rows.to_high;
-                                     load(high, row[0]);
-                                     load(high + rows.to_next, row[1]);
-                                     value = value + (row[0] * rows.weight[2] + row[1] * rows.weight[3]);
-                                 };
-    std::array<Lanes, results> all{};
-    Lanes clamped{};
-    const std::size_t lanes = tables.blocks * lanes_per_block;
-    for (const PairSource& source : sources) {
-        const Vec3f d = target.position - source.position;
-        const float square = d.x * d.x + d.y * d.y + d.z * d.z;
-        float chord = std::sqrt(square);
-        if (chord >= tables.reach)
-            continue;
-        const bool is_disk = !are_clusters && chord < tables.disks[source.disk]->end;
-        if (is_disk)
-            chord = std::max(chord, tables.disks[source.disk]->begin);
-        const ChordTable& table = is_disk ? tables.disks[source.disk]->light : tables.point->light;
-        const std::uint32_t step = std::clamp(chord_step(chord), table.first, table.first + table.rows - 2);
-        const float before = chord_of(step);
-        const float part = std::clamp((chord - before) / (chord_of(step + 1) - before), 0.0f, 1.0f);
-        const float per_square = 1.0f / std::max(chord * chord, before * before);
-        const float curvature = ((target.normal.x - source.normal.x) * d.x + (target.normal.y - source.normal.y) * d.y +
-                                 (target.normal.z - source.normal.z) * d.z) *
-                                per_square;
-        std::array<Rows, results> rows;
-        bool is_beyond = false;
-        bool at_node = true;
-        for (std::size_t r = 0; r < results; ++r) {
-            const CurvatureScale& scale = tables.scales[r];
-            const float inside = std::clamp(curvature, scale.nodes.front(), scale.nodes.back());
-            std::size_t k = scale.per_step > 0.0f ? scale.interval_of(inside) : 0;
-            float to_next =
-                scale.per_step > 0.0f ? (inside - scale.nodes[k]) / (scale.nodes[k + 1] - scale.nodes[k]) : 0.0f;
+    const Floats dx = target[0] - source.position.x;
+    const Floats dy = target[1] - source.position.y;
+    const Floats dz = target[2] - source.position.z;
+    Floats chord = dx * dx + dy * dy + dz * dz;
+    find_roots(chord);
+    pairs.chord = chord;
+    const ChordTable& point = tables.point->light;
+    Integers first = Integers{} + static_cast<std::int32_t>(point.first);
+    Integers last = first + static_cast<std::int32_t>(point.rows - 2);
+    pairs.is_disk = Integers{};
+    if (!is_cluster) {
+        const DiskTable& disk = *tables.disks[source.disk];
+        pairs.is_disk = chord < disk.end;
+        chord = (pairs.is_disk & (chord < disk.begin)) ? Floats{} + disk.begin : chord;
+        const auto disk_first = static_cast<std::int32_t>(disk.light.first);
+        const auto disk_last = disk_first + static_cast<std::int32_t>(disk.light.rows - 2);
+        first = pairs.is_disk ? Integers{} + disk_first : first;
+        last = pairs.is_disk ? Integers{} + disk_last : last;
+    }
+    Integers step = reinterpret_cast<Integers>(chord) >> within_chord_bits;
+    step = step < first ? first : step > last ? last : step;
+    const Floats before = reinterpret_cast<Floats>(step << within_chord_bits);
+    const Floats after = reinterpret_cast<Floats>((step + 1) << within_chord_bits);
+    const Floats zero{};
+    const Floats one = zero + 1.0f;
+    const Floats part = (chord - before) / (after - before);
+    pairs.part = part < zero ? zero : part > one ? one : part;
+    pairs.step = step - first;
+    const Floats least = chord < before ? before : chord;
+    pairs.per_square = one / (least * least);
+    pairs.curvature =
+        ((target[3] - source.normal.x) * dx + (target[4] - source.normal.y) * dy + (target[5] - source.normal.z) * dz) *
+        pairs.per_square;
+    const Floats x = dx * source.tangent.x + dy * source.tangent.y + dz * source.tangent.z;
+    const Floats y = dx * source.binormal.x + dy * source.binormal.y + dz * source.binormal.z;
+    Floats across = x * x + y * y;
+    find_roots(across);
+    // On planes and balls |D_t| / c = sqrt(1 - (k c / 2)^2). Where a chord is steeper than any but the longest of a
+    // ball, the azimuth changes abruptly from point to point; there harmonics fade, as they do opposite the entry.
+    const Floats fade = chord * steep;
+    across = across < fade ? fade : across;
+    const Floats least_across = zero + std::numeric_limits<float>::min();
+    const Floats per_across = one / (across < least_across ? least_across : across);
+    pairs.cosine = x * per_across;
+    pairs.sine = y * per_across;
+}
+
+[[gnu::always_inline]] inline void find_rows(const PairTables& tables, const PairSource& source, const Pairs& pairs,
+                                             const CurvatureScale& scale, bool is_cluster, Integers& is_inside,
+                                             Rows& rows)
+{
+    const Floats low = Floats{} + scale.nodes.front();
+    const Floats high = Floats{} + scale.nodes.back();
+    const Floats& curvature = pairs.curvature;
+    const Floats inside = curvature < low ? low : curvature > high ? high : curvature;
+    is_inside = inside == curvature;
+    const std::uint32_t lanes = static_cast<std::uint32_t>(tables.blocks * lanes_per_block);
+    const std::uint32_t point_rows = tables.point->light.rows;
+    const std::uint32_t disk_rows = is_cluster ? 0 : tables.disks[source.disk]->light.rows;
+    for (std::size_t i = 0; i < PairTargets::most; ++i) {
+        std::size_t k = 0;
+        float to_next = 0.0f;
+        if (scale.per_step > 0.0f) {
+            k = scale.interval_of(inside[i]);
+            to_next = (inside[i] - scale.nodes[k]) * scale.per_width[k];
             if (std::abs(to_next - 1.0f) < least_part) {
                 ++k;
                 to_next = 0.0f;
             } else if (std::abs(to_next) < least_part) {
                 to_next = 0.0f;
             }
-            at_node = at_node && to_next == 0.0f;
-            const std::size_t next = to_next != 0.0f ? k + 1 : k;
-            if (r == 0)
-                is_beyond = inside != curvature;
-            const std::size_t row = k * table.rows + step - table.first;
-            rows[r] = {
-                row * lanes,
-                lanes,
-                (next - k) * table.rows * lanes,
-                {(1.0f - to_next) * (1.0f - part), (1.0f - to_next) * part, to_next * (1.0f - part), to_next * part}};
         }
-        // The chord's azimuth in the tangent plane of the source.
-        const float x = d.x * source.tangent.x + d.y * source.tangent.y + d.z * source.tangent.z;
-        const float y = d.x * source.binormal.x + d.y * source.binormal.y + d.z * source.binormal.z;
-        const float across = std::sqrt(x * x + y * y);
-        // On planes and balls |D_t| / c = sqrt(1 - (k c / 2)^2). Where a chord is steeper than any but the longest of a
-        // ball, the azimuth changes abruptly from point to point; there harmonics fade, as they do opposite the entry.
-        const float per_across = 1.0f / std::max({across, steep * chord, std::numeric_limits<float>::min()});
-        Harmonics8 real, imaginary;
-        powers(x * per_across, y * per_across, real, imaginary);
+        const std::uint32_t count = pairs.is_disk[i] != 0 ? disk_rows : point_rows;
+        rows.first[i] = (static_cast<std::uint32_t>(k) * count + static_cast<std::uint32_t>(pairs.step[i])) * lanes;
+        rows.to_high[i] = to_next != 0.0f ? count * lanes : 0;
+        rows.to_next[i] = to_next;
+    }
+    Floats to_next;
+    load_targets(rows.to_next, to_next);
+    rows.weight = {(1.0f - to_next) * (1.0f - pairs.part), (1.0f - to_next) * pairs.part, to_next * (1.0f - pairs.part),
+                   to_next * pairs.part};
+}
+
+template <std::size_t most_results, bool are_clusters>
+void add_pairs_of(const PairTables& tables, const PairTargets& targets, std::span<const PairSource> sources,
+                  const float* moments, std::size_t stride, float* sums, float* beyond)
+{
+    const std::size_t results = is_plain ? tables.results : most_results;
+    std::array<Floats, 6> target;
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+        load_targets(targets.position[axis], target[axis]);
+        load_targets(targets.normal[axis], target[3 + axis]);
+    }
+    std::array<std::array<Lanes, most_results>, PairTargets::most> all{};
+    std::array<Lanes, PairTargets::most> clamped{};
+    const std::size_t lanes = tables.blocks * lanes_per_block;
+    Pairs pairs;
+    std::array<Rows, most_results> rows;
+    for (const PairSource& source : sources) {
+        find_pairs(tables, target, source, are_clusters, pairs);
+        Integers is_inside{};
+        for (std::size_t r = results; r-- > 0;)
+            find_rows(tables, source, pairs, tables.scales[r], are_clusters, is_inside, rows[r]);
         const float* of_source = moments + source.moments * stride;
-        const float weight = source.area * per_square;
-        real *= weight;
-        imaginary *= weight;
-        const std::size_t blocks = is_disk ? tables.blocks : tables.point->blocks[step - table.first];
-        for (std::size_t b = 0; b < blocks; ++b) {
-            Lanes cosines, sines;
-            spread(real, tables.harmonic.data() + b * lanes_per_block, cosines);
-            spread(imaginary, tables.harmonic.data() + b * lanes_per_block, sines);
-            Lanes light{};
-            for (std::size_t r = 0; r < results; ++r) {
-                if (r == 0 || tables.set[r] != tables.set[r - 1]) {
-                    const float* values = of_source + (tables.set[r] * tables.blocks + b) * 2 * lanes_per_block;
-                    std::array<Lanes, 2> pair;
-                    load(values, pair[0]);
-                    load(values + lanes_per_block, pair[1]);
-                    light = pair[0] * cosines + pair[1] * sines;
-                }
+        for (std::size_t i = 0; i < targets.count; ++i) {
+            if (!(pairs.chord[i] < tables.reach) || (!are_clusters && source.moments == targets.own[i]))
+                continue;
+            const bool is_disk = !are_clusters && pairs.is_disk[i] != 0;
+            bool at_node = true;
+            for (std::size_t r = 0; r < results; ++r)
+                at_node = at_node && rows[r].to_high[i] == 0;
+            const ChordTable& table = is_disk ? tables.disks[source.disk]->light : tables.point->light;
+            Harmonics8 real, imaginary;
+            powers(pairs.cosine[i], pairs.sine[i], real, imaginary);
+            const float weight = source.area * pairs.per_square[i];
+            real *= weight;
+            imaginary *= weight;
+            // Value at the place of the rows of a result.
+            const auto interpolate = [&](std::size_t r, const float* values, Lanes& value)
+                                         __attribute__((always_inline)) {
+                                             const float* first = values + rows[r].first[i];
+                                             std::array<Lanes, 2> row;
+                                             load(first, row[0]);
+                                             load(first + lanes, row[1]);
+                                             value = row[0] * rows[r].weight[0][i] + row[1] * rows[r].weight[1][i];
+                                             if (at_node)
+                                                 return;
+                                             const float* high = first + rows[r].to_high[i];
+                                             load(high, row[0]);
+                                             load(high + lanes, row[1]);
+                                             value += row[0] * rows[r].weight[2][i] + row[1] * rows[r].weight[3][i];
+                                         };
+            const auto step = static_cast<std::size_t>(pairs.step[i]);
+            const std::size_t blocks = is_disk ? tables.blocks : tables.point->blocks[step];
+            for (std::size_t b = 0; b < blocks; ++b) {
                 const std::size_t at = b * lanes_per_block;
-                Lanes value;
-                interpolate(rows[r], at_node, table.values[r].data() + at, value);
-                if constexpr (are_clusters) {
-                    Lanes second;
-                    interpolate(rows[r], at_node, tables.point->laplacian.values[r].data() + at, second);
-                    value += second * (source.spread * per_square);
+                Lanes cosines, sines;
+                spread(real, tables.harmonic.data() + at, cosines);
+                spread(imaginary, tables.harmonic.data() + at, sines);
+                Lanes light{};
+                for (std::size_t r = 0; r < results; ++r) {
+                    if (r == 0 || tables.set[r] != tables.set[r - 1]) {
+                        const float* values = of_source + (tables.set[r] * tables.blocks + b) * 2 * lanes_per_block;
+                        std::array<Lanes, 2> pair;
+                        load(values, pair[0]);
+                        load(values + lanes_per_block, pair[1]);
+                        light = pair[0] * cosines + pair[1] * sines;
+                    }
+                    Lanes value;
+                    interpolate(r, table.values[r].data() + at, value);
+                    if constexpr (are_clusters) {
+                        Lanes second;
+                        interpolate(r, tables.point->laplacian.values[r].data() + at, second);
+                        value += second * (source.spread * pairs.per_square[i]);
+                    }
+                    const Lanes product = light * value;
+                    all[i][r] += product;
+                    if (r == 0 && is_inside[i] == 0)
+                        clamped[i] += product;
                 }
-                const Lanes product = light * value;
-                all[r] += product;
-                if (r == 0 && is_beyond)
-                    clamped += product;
             }
         }
     }
-    for (std::size_t r = 0; r < results; ++r)
-        sums[r] += sum_of(all[r]);
-    beyond += sum_of(clamped);
+    for (std::size_t i = 0; i < targets.count; ++i) {
+        for (std::size_t r = 0; r < results; ++r)
+            sums[i * max_results + r] += sum_of(all[i][r]);
+        beyond[i] += sum_of(clamped[i]);
+    }
 }
 
 template <bool are_clusters>
-void add_pairs_of_kind(const PairTables& tables, const PairTarget& target, std::span<const PairSource> sources,
-                       const float* moments, std::size_t stride, float* sums, float& beyond)
+void add_pairs_of_kind(const PairTables& tables, const PairTargets& targets, std::span<const PairSource> sources,
+                       const float* moments, std::size_t stride, float* sums, float* beyond)
 {
     static_assert(max_results == 3);
-    if (tables.results == 1)
-        add_pairs_of<1, are_clusters>(tables, target, sources, moments, stride, sums, beyond);
+    if constexpr (is_plain)
+        add_pairs_of<3, are_clusters>(tables, targets, sources, moments, stride, sums, beyond);
+    else if (tables.results == 1)
+        add_pairs_of<1, are_clusters>(tables, targets, sources, moments, stride, sums, beyond);
     else if (tables.results == 2)
-        add_pairs_of<2, are_clusters>(tables, target, sources, moments, stride, sums, beyond);
+        add_pairs_of<2, are_clusters>(tables, targets, sources, moments, stride, sums, beyond);
     else
-        add_pairs_of<3, are_clusters>(tables, target, sources, moments, stride, sums, beyond);
+        add_pairs_of<3, are_clusters>(tables, targets, sources, moments, stride, sums, beyond);
 }
 
-void add_pairs(const PairTables& tables, const PairTarget& target, std::span<const PairSource> sources,
-               bool are_clusters, const float* moments, std::size_t stride, float* sums, float& beyond)
+void add_pairs(const PairTables& tables, const PairTargets& targets, std::span<const PairSource> sources,
+               bool are_clusters, const float* moments, std::size_t stride, float* sums, float* beyond)
 {
     const auto add = are_clusters ? add_pairs_of_kind<true> : add_pairs_of_kind<false>;
-    add(tables, target, sources, moments, stride, sums, beyond);
+    add(tables, targets, sources, moments, stride, sums, beyond);
 }
 
 }  // namespace HWY_NAMESPACE
@@ -230,10 +324,10 @@ HWY_AFTER_NAMESPACE();
 namespace beamspread {
 
 HWY_EXPORT(add_pairs);
-void add_pairs(const PairTables& tables, const PairTarget& target, std::span<const PairSource> sources,
-               bool are_clusters, const float* moments, std::size_t stride, float* sums, float& beyond)
+void add_pairs(const PairTables& tables, const PairTargets& targets, std::span<const PairSource> sources,
+               bool are_clusters, const float* moments, std::size_t stride, float* sums, float* beyond)
 {
-    HWY_DYNAMIC_DISPATCH(add_pairs)(tables, target, sources, are_clusters, moments, stride, sums, beyond);
+    HWY_DYNAMIC_DISPATCH(add_pairs)(tables, targets, sources, are_clusters, moments, stride, sums, beyond);
 }
 
 }  // namespace beamspread

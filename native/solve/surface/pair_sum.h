@@ -1,8 +1,10 @@
 // Sums of light from many sources at one target, vectorized.
 #pragma once
 
+#include <array>
 #include <cstddef>
 #include <cstdint>
+#include <limits>
 #include <span>
 
 #include "base/vec.h"
@@ -22,15 +24,34 @@ struct PairSource {
     float spread;  // a quarter of the mean squared distance of a cluster's light from its position, m^2
 };
 
-struct PairTarget {
-    Vec3f position;
-    Vec3f normal;
+// Largest number of results of a pair.
+inline constexpr std::size_t max_results = 3;
+
+// Targets side by side, which share their sources.
+struct PairTargets {
+    static constexpr std::size_t most = 8;
+    static constexpr std::uint32_t none = std::numeric_limits<std::uint32_t>::max();
+
+    std::size_t count = 0;
+    std::array<std::array<float, most>, 3> position{};  // [axis][target]
+    std::array<std::array<float, most>, 3> normal{};
+    std::array<std::uint32_t, most> own{};  // index of the moments that are no source of a target's; or none
+
+    void add(const Vec3f& at, const Vec3f& up, std::uint32_t moments)
+    {
+        for (int axis = 0; axis < 3; ++axis) {
+            position[static_cast<std::size_t>(axis)][count] = at[axis];
+            normal[static_cast<std::size_t>(axis)][count] = up[axis];
+        }
+        own[count] = moments;
+        ++count;
+    }
 };
 
-// Adds the radiant exitance at a target that sources cause: sums[result], and in `beyond` the part of result 0 from
-// pairs that bend more than the tables. `moments` has the sources' moments, each of `stride` values. The sources are
-// samples, or all clusters.
-void add_pairs(const PairTables& tables, const PairTarget& target, std::span<const PairSource> sources,
-               bool are_clusters, const float* moments, std::size_t stride, float* sums, float& beyond);
+// Adds the radiant exitance at targets that sources cause: sums[target][result], and in beyond[target] the part of result
+// 0 from pairs that bend more than the tables. `moments` has the sources' moments, each of `stride` values. The sources
+// are samples, or all clusters.
+void add_pairs(const PairTables& tables, const PairTargets& targets, std::span<const PairSource> sources,
+               bool are_clusters, const float* moments, std::size_t stride, float* sums, float* beyond);
 
 }  // namespace beamspread

@@ -54,6 +54,8 @@ void PairTables::make_scales(const SurfaceBasis& basis)
         for (const double curvature : basis.curvatures[result.medium])
             scale.nodes.push_back(static_cast<float>(curvature / medium.mean_free_path));
         if (scale.nodes.size() > 1) {
+            for (std::size_t k = 0; k + 1 < scale.nodes.size(); ++k)
+                scale.per_width.push_back(1.0f / (scale.nodes[k + 1] - scale.nodes[k]));
             const float width = scale.nodes.back() - scale.nodes.front();
             scale.per_step = static_cast<float>(CurvatureScale::steps) / width;
             for (std::size_t i = 0; i < CurvatureScale::steps; ++i) {

@@ -17,6 +17,7 @@ namespace beamspread {
 struct CurvatureScale {
     static constexpr std::size_t steps = 256;
     std::vector<float> nodes;                    // 1 / metre, ascending
+    std::vector<float> per_width;                // [interval] 1 / its width, metres
     float per_step = 0.0f;                       // steps per curvature; 0 for a single node
     std::array<std::uint8_t, steps> interval{};  // index of the node before the middle of a step
 

@@ -22,13 +22,18 @@ constexpr std::size_t rays_at_once = 512;
 // Leaves of the tree in one work item.
 constexpr std::size_t leaves_at_once = 16;
 
-// Bound on the error of a far cluster's light over the tolerance: errors of a few hundred clusters add up, with either
-// sign. Larger: fewer pairs, larger errors.
-constexpr double error_share = 0.3;
+// Bounds on the error of a far cluster's light over the tolerance that are tried, from the largest on, each half of the
+// one before. The first one is taken whose probed samples differ from those with a quarter of it by less than a fraction
+// of the tolerance: errors of other samples are larger. Larger fraction: fewer pairs, larger errors.
+constexpr double most_share = 8.0;
+constexpr double least_share = 1e-3;
+constexpr double probed_fraction = 0.3;
 
-// Leaves that are solved to find the largest luminance, twice, and the size of their clusters over the distance. More
-// leaves: a tolerance closer to that of the brightest sample.
-constexpr std::size_t probed_count = 64;
+// Leaves of which samples are probed: the brightest and others. More: errors closer to the tolerance, more time.
+constexpr std::size_t bright_probes = 8;
+constexpr std::size_t even_probes = 40;
+
+// Size over distance of clusters with which the largest luminance is found.
 constexpr float probing_size = 0.3f;
 
 // Area of a cut sample's own light over that of the whole sample, at least. Larger: cut samples are brighter where light
@@ -234,57 +239,81 @@ void SurfaceField::solve(Progress& progress, float* luminance)
 }
 
 // The error of a cluster's light is at most about its weight times its squared size times the kernel's second derivative.
+// How errors of clusters add up depends on the surface and its light: some samples are solved with ever smaller bounds
+// until the results change no more.
 SurfaceTree::Opening SurfaceField::find_opening()
 {
-    const std::vector<std::size_t> leaves = m_tree.probed_leaves(probed_count);
-    std::vector<std::array<float, 3>> largest(leaves.size());
-    parallel_for(leaves.size(), [&](std::size_t i) {
-        solve_leaf(leaves[i], {probing_size, 0, {}}, m_sources.local(), [&](std::size_t, const Exitance& exitance) {
-            for (std::size_t r = 0; r < m_tables.results; ++r)
-                largest[i][r] = std::max(largest[i][r], exitance.sums[r]);
+    const std::vector<std::size_t> leaves = m_tree.probed_leaves(bright_probes, even_probes);
+    using Exitances = std::vector<std::array<float, max_results>>;
+    const auto probe = [&](const SurfaceTree::Opening& opening) {
+        std::vector<Exitances> found(leaves.size());
+        parallel_for(leaves.size(), [&](std::size_t i) {
+            solve_leaf(leaves[i], opening, m_sources.local(),
+                       [&](std::size_t, const Exitance& exitance) { found[i].push_back(exitance.sums); });
         });
-    });
-    std::vector<double> bound(m_tables.point->light.rows);
-    for (std::size_t r = 0; r < m_tables.results; ++r) {
+        return found;
+    };
+    // Largest difference of results, or largest result.
+    const auto largest = [&](std::size_t r, const std::vector<Exitances>& found, const std::vector<Exitances>* other) {
         float most = 0.0f;
-        for (const auto& exitance : largest)
-            most = std::max(most, exitance[r]);
+        for (std::size_t i = 0; i < leaves.size(); ++i)
+            for (std::size_t k = 0; k < found[i].size(); ++k)
+                most = std::max(most, std::abs(found[i][k][r] - (other != nullptr ? (*other)[i][k][r] : 0.0f)));
+        return static_cast<double>(most);
+    };
+    const std::vector<Exitances> first = probe({probing_size, 0, {}});
+    std::vector<double> bound(m_tables.point->light.rows);
+    std::array<double, max_results> brightest{};
+    for (std::size_t r = 0; r < m_tables.results; ++r) {
+        brightest[r] = largest(r, first, nullptr);
         const double scale = static_cast<double>(m_tree.set_scales()[m_tables.set[r]]);
-        if (most == 0.0f || scale == 0.0)
+        if (brightest[r] == 0.0 || scale == 0.0)
             continue;
         const std::vector<double> bends = m_tables.second_derivatives(r);
         for (std::size_t row = 0; row < bound.size(); ++row)
-            bound[row] = std::max(bound[row], bends[row] / (scale * static_cast<double>(most)));
+            bound[row] = std::max(bound[row], bends[row] / (scale * brightest[r]));
     }
-    SurfaceTree::Opening opening{0.0f, m_tables.point->light.first, {}};
-    for (const double value : bound)
-        opening.bound.push_back(static_cast<float>(value / (error_share * m_problem.tolerance)));
-    return opening;
+    std::array<SurfaceTree::Opening, 3> openings;  // the last ones, in turn, and their results
+    std::array<std::vector<Exitances>, 3> found;
+    double share = most_share;
+    for (std::size_t i = 0; share >= least_share; ++i, share *= 0.5) {
+        SurfaceTree::Opening& opening = openings[i % 3];
+        opening = {0.0f, m_tables.point->light.first, {}};
+        for (const double value : bound)
+            opening.bound.push_back(static_cast<float>(value / (share * m_problem.tolerance)));
+        found[i % 3] = probe(opening);
+        bool is_enough = i >= 2;
+        for (std::size_t r = 0; r < m_tables.results && i >= 2; ++r) {
+            const double change = largest(r, found[(i - 2) % 3], &found[i % 3]);
+            is_enough = is_enough && change <= probed_fraction * m_problem.tolerance * brightest[r];
+        }
+        if (is_enough)
+            return openings[(i - 2) % 3];
+    }
+    return {};
 }
 
 void SurfaceField::solve_leaf(std::size_t leaf, const SurfaceTree::Opening& opening, SurfaceTree::Sources& sources,
                               const std::function<void(std::size_t, const Exitance&)>& store_exitance) const
 {
     m_tree.find(leaf, opening, m_tables.reach, sources);
-    const std::span<const PairSource> near = sources.near;
-    std::size_t self = 0;
-    for (const std::uint32_t i : m_tree.samples_of(leaf)) {
-        const SurfaceSample& sample = m_problem.samples[i];
-        const PairTarget target{sample.position, sample.normal};
-        Exitance exitance;
-        const auto add = [&](std::span<const PairSource> pairs, bool are_clusters) {
-            add_pairs(m_tables, target, pairs, are_clusters, m_moments.data(), m_basis.moments(), exitance.sums.data(),
-                      exitance.beyond);
-        };
-        const bool is_lit = self < near.size() && near[self].moments == i;
-        add(near.first(self), false);
-        add(near.subspan(is_lit ? self + 1 : self), false);
-        add(sources.far, true);
-        if (is_lit) {
-            add_self(i, exitance.sums);
-            ++self;
-        }
-        store_exitance(i, exitance);
+    PairTargets targets;
+    for (const std::uint32_t i : m_tree.samples_of(leaf))
+        targets.add(m_problem.samples[i].position, m_problem.samples[i].normal, i);
+    std::array<float, PairTargets::most * max_results> sums{};
+    std::array<float, PairTargets::most> beyond{};
+    const auto add = [&](std::span<const PairSource> pairs, bool are_clusters) {
+        add_pairs(m_tables, targets, pairs, are_clusters, m_moments.data(), m_basis.moments(), sums.data(),
+                  beyond.data());
+    };
+    add(sources.near, false);
+    add(sources.far, true);
+    for (std::size_t k = 0; k < targets.count; ++k) {
+        Exitance exitance{{}, beyond[k]};
+        std::copy_n(sums.begin() + static_cast<std::ptrdiff_t>(k * max_results), max_results, exitance.sums.begin());
+        if (m_tree.is_lit(targets.own[k]))
+            add_self(targets.own[k], exitance.sums);
+        store_exitance(targets.own[k], exitance);
     }
 }
 

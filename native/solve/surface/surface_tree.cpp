@@ -213,21 +213,21 @@ void SurfaceTree::weigh(const SurfaceBasis& basis, const PairTables& tables, con
     });
 }
 
-std::vector<std::size_t> SurfaceTree::probed_leaves(std::size_t count) const
+std::vector<std::size_t> SurfaceTree::probed_leaves(std::size_t bright, std::size_t even) const
 {
     std::vector<std::size_t> leaves(m_leaves.size());
     std::iota(leaves.begin(), leaves.end(), std::size_t{0});
-    if (leaves.size() <= 2 * count)
+    if (leaves.size() <= bright + even)
         return leaves;
     const auto brighter = [&](std::size_t a, std::size_t b) {
         const float first = m_nodes[m_leaves[a]].weight;
         const float second = m_nodes[m_leaves[b]].weight;
         return first != second ? first > second : a < b;
     };
-    std::nth_element(leaves.begin(), leaves.begin() + static_cast<std::ptrdiff_t>(count), leaves.end(), brighter);
-    leaves.resize(count);
-    for (std::size_t i = 0; i < count; ++i)
-        leaves.push_back(i * m_leaves.size() / count);
+    std::nth_element(leaves.begin(), leaves.begin() + static_cast<std::ptrdiff_t>(bright), leaves.end(), brighter);
+    leaves.resize(bright);
+    for (std::size_t i = 0; i < even; ++i)
+        leaves.push_back((2 * i + 1) * m_leaves.size() / (2 * even));
     return leaves;
 }
 

@@ -41,11 +41,14 @@ public:
         return std::span(m_order).subspan(node.begin, node.end - node.begin);
     }
 
+    // Whether any light reaches a sample; after `gather`.
+    bool is_lit(std::size_t sample) const { return m_weights[sample] > 0.0f; }
+
     // Factors from a set's light, irradiance times u(theta) of the first function, to the weights of clusters.
     const std::vector<float>& set_scales() const { return m_set_scales; }
 
-    // The `count` brightest leaves, and as many evenly spread.
-    std::vector<std::size_t> probed_leaves(std::size_t count) const;
+    // The brightest leaves, and some evenly spread.
+    std::vector<std::size_t> probed_leaves(std::size_t bright, std::size_t even) const;
 
     // Gathers the light of all samples in clusters. `moments`: [sample], then [node], as in `SurfaceBasis`; those of
     // nodes are written.
