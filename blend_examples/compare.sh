@@ -37,6 +37,10 @@ render stage with_volume.py "$pictures/stage_by_volume.png" \
 beside stage "$pictures/stage.png" "Beamspread" "$pictures/stage_by_volume.png" "Cycles, paths through the volume" \
     "$pictures/stage_diffuse.png" "Cycles, diffuse"
 
+render veined_slab with_convention.py "$pictures/veined_slab_by_convention.png"
+beside veined_slab "$pictures/veined_slab.png" "Beamspread: light scatters in the veins" \
+    "$pictures/veined_slab_by_convention.png" "As renderers do: light, times the texture"
+
 for scene in round_soap jade_bowl marble_head paper_page paper_shade; do
     render "$scene" with_paths.py "$pictures/${scene}_by_paths.png" 128
     beside "$scene" "$pictures/$scene.png" "Beamspread" \

@@ -30,6 +30,7 @@ import shop_window  # noqa: E402
 import soap_bar  # noqa: E402
 import soapstone  # noqa: E402
 import stage  # noqa: E402
+import veined_slab  # noqa: E402
 
 # The medium of the paper's figures 7 and 8 (Manabe et al. 2012): index-matched, forward scattering, coloured.
 PAPER_MEDIUM = {"color_mode": "ALBEDO", "albedo": (0.6, 0.9, 0.3), "anisotropy": 0.8, "ior": 1.0}
@@ -109,6 +110,7 @@ def main():
         "soap_bar": soap_bar.build,
         "stage": stage.build,
         "shop_window": shop_window.build,
+        "veined_slab": veined_slab.build,
     }
     # Names after the `--` choose.
     chosen = sys.argv[sys.argv.index("--") + 1 :] if "--" in sys.argv else []

@@ -30,6 +30,7 @@ KINDS = {
     "marble_head": ["SunLight", "WorldLight"],
     "paper_page": ["PointLight", "WorldLight"],
     "paper_shade": ["PointLight", "WorldLight"],
+    "veined_slab": ["SunLight", "SunLight"],
 }
 PARTS = {"soap_bar": 1, "plank_floor": 35, "acrylic_letters": 6}
 
