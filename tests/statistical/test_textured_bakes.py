@@ -1,0 +1,91 @@
+"""Bakes of textures in which light scatters, under lights of the scene, against photons (tests/plain_textured_walk.py).
+
+L1 distances are of 24 x 24 texels, beyond the noise of the count. The convention for textures is off by 7 to 11 %.
+"""
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from beamspread import Medium, library
+from beamspread.core.bake.bake_settings import BakeSettings
+from beamspread.core.bake.layers import arrive
+from beamspread.core.bake.spread_light import Spreading, spread_side
+from beamspread.core.bake.textured_bake import with_factors
+from beamspread.core.material import Material
+from beamspread.core.progress import Progress
+from beamspread.core.scene.illumination import Illumination
+from beamspread.core.scene.lights import PointLight, SunLight, WorldLight
+
+from bakes import bake, square
+from plain_textured_walk import exitance
+
+G, SIDE, PITCH, PHOTONS = 0.8, 24, 0.01, 600_000
+GRID, SETTINGS = square(SIDE, side=SIDE * PITCH), BakeSettings()
+MATERIAL = Material(albedo=(0.5,) * 3, mean_free_path=(PITCH,) * 3, anisotropy=G)
+COMMON = "Light", 1.0, (1.0, 1.0, 1.0), True
+ROWS, COLUMNS = np.mgrid[:SIDE, :SIDE]
+VEINS = 0.87 + 0.12 * np.abs(np.sin(0.5 * COLUMNS + 1.3 * np.sin(0.35 * ROWS)) * np.sin(0.3 * ROWS + 0.2 * COLUMNS))
+HEIGHT = 8 * PITCH
+
+
+def from_lamp():
+    """Directions from a lamp over the middle."""
+    x, y = (COLUMNS + 0.5 - SIDE / 2) * PITCH, (ROWS + 0.5 - SIDE / 2) * PITCH
+    way = np.stack([x, y, np.full_like(x, -HEIGHT)], -1)
+    return way / np.linalg.norm(way, axis=-1, keepdims=True)
+
+
+def from_sky(seed):
+    """A direction of even light from all around at each texel."""
+    squared, turn = np.random.default_rng(seed).random((2, SIDE, SIDE))
+    sine, azimuth = np.sqrt(squared), 2 * np.pi * turn
+    return np.stack([sine * np.cos(azimuth), sine * np.sin(azimuth), -np.sqrt(1 - squared)], -1)
+
+
+SUN = 0.6, 0.0, -0.8
+# Lights, directions of each part of the count, and the bounds of the L1 distance and of the total.
+CASES = {
+    "sun": (SunLight(*COMMON, SUN), [np.array(SUN)], 0.02, 0.005),
+    "lamp": (PointLight(*COMMON, (0.0, 0.0, HEIGHT)), [from_lamp()], 0.04, 0.01),
+    "sky": (
+        WorldLight(*COMMON, np.ones((1, 1, 3), np.float32), tuple(map(tuple, np.eye(3).tolist()))),
+        [*map(from_sky, range(6))],
+        0.04,
+        0.01,
+    ),
+}
+
+
+@pytest.mark.parametrize("name", CASES)
+def test_light_agrees_with_a_photon_count(name):
+    """Lights of many directions are off by up to 4 %, since eight or fewer stand for them."""
+    light, ways, bound, most = CASES[name]
+    illumination = Illumination([light])
+    irradiance = arrive(GRID, illumination, SETTINGS)[0][..., 0] / len(ways)
+    photons, halves = PHOTONS // 2 // len(ways) // 100_000 or 1, []
+    for half in (1, 2):
+        parts = [
+            exitance(irradiance, way, VEINS, 1.0, G, 100_000 * photons, seed=10 * half + number)[0]
+            for number, way in enumerate(ways)
+        ]
+        halves.append(sum(parts) / math.pi)
+    truth, noise = np.mean(halves, axis=0), np.abs(halves[0] - halves[1]).mean() / 2
+    grid, albedo = GRID, np.repeat(VEINS[..., None], 3, axis=2).astype(np.float32)
+    ours = bake(replace(grid, albedo=albedo), illumination, MATERIAL, 0.0, SETTINGS)[..., 0]
+    assert distance(ours, truth, noise) < bound
+    assert abs(ours.mean() / truth.mean() - 1) < most + 3 * noise / math.sqrt(truth.size) / truth.mean()
+    assert distance(by_convention(albedo, illumination), truth, noise) > 0.06
+
+
+def distance(ours, truth, noise):
+    """Mean difference beyond the count's noise, over the mean."""
+    return (np.abs(ours - truth).mean() - noise) / truth.mean()
+
+
+def by_convention(albedo, illumination):
+    """Luminance where the texture multiplies light in a medium of the mean reflectance."""
+    sources = [library(Medium(G))] * 3
+    (grid,), material = with_factors([replace(GRID, albedo=albedo)], MATERIAL, sources)
+    return spread_side("reflected", [grid], Spreading(illumination, material, sources, SETTINGS), Progress())[0][..., 0]
