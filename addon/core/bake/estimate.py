@@ -55,6 +55,9 @@ BENT, BENT_TEXEL, BENT_SHORT, BENT_LONG = 1.5, 3e-6, 45e-6, 5e-6
 # Part of a surface that bends that lamps and suns light, about.
 LIT_BY_LAMPS = 0.5
 
+# Seconds per texel of light in a texture's albedos; lamps take three times as long as a sun, which this is between.
+TEXTURED = 4e-6
+
 # Seconds of the simulation of an angle in final quality, in half-spaces; and in slabs up to a thickness in mean free
 # paths, with whose root it grows beyond.
 HALF_SPACE_ANGLE, SLAB_ANGLE, SLAB_THICKNESS = 6.0, 0.9, 5.0
@@ -270,6 +273,11 @@ def _parallel(seconds: float, threads: int) -> float:
 def bounced_seconds(triangles: int, lights: int, threads: int) -> float:
     """Seconds in which our own rays find bounced light."""
     return _parallel(BOUNCED + (BOUNCED_TRIANGLES + BOUNCED_LIGHTS * lights) * math.log2(1 + triangles), threads)
+
+
+def textured_seconds(texels: int, threads: int) -> float:
+    """Seconds in which light is found in the albedos of texels."""
+    return _parallel(TEXTURED * texels, threads)
 
 
 def cycles_light_seconds(world: bool, lamps: int, bounced: bool, triangles: int) -> float:

@@ -14,7 +14,7 @@ from ..progress import Progress
 from .bake_settings import BakeSettings
 from .bent_limits import bent_messages
 from .edges import texels_with_images, with_edges
-from .estimate import simulation_seconds
+from .estimate import simulation_seconds, textured_seconds
 from .finish import finished_texture
 from .job import BakeJob, Step
 from .layers import LAYERS, WITHOUT_MEDIUM
@@ -37,6 +37,9 @@ Peaks of processes with 256^2 to 2048^2 texels (tests/unit/test_memory.py), roun
 
 OTHER_SOLVER = BYTES["direct"]
 """The same of a solver that is not listed: the most that a listed one takes per texel."""
+
+TEXTURED_BYTES = 60e6, 200
+"""The same that textures take in addition in which light scatters: albedos, factors, directions, paths."""
 
 BENT_BYTES = 400e6, 2500
 """The same of surfaces that bend, per texel that shows them."""
@@ -99,7 +102,8 @@ class Solve(Step):
     name = "Baking"
 
     def seconds(self, job: BakeJob) -> float:
-        return sum(load.seconds(job.settings) for load in job.workloads())
+        textured = textured_seconds(textured_texels(job), job.settings.threads)
+        return textured + sum(load.seconds(job.settings) for load in job.workloads())
 
     def kind(self, job: BakeJob) -> str:
         return self.kind_for(job.settings)
@@ -151,7 +155,8 @@ class Solve(Step):
         kind = (SUNS if all(light.is_parallel for light in lights) else NARROW) if is_narrow else WIDE
         is_slab = surface.thickness > 0 and surface.material.ior > 1
         paths = surface.thickness / max(surface.material.mean_free_path) if is_slab else math.inf
-        return bake_bytes(texels, job.settings.solver, kind, paths)
+        fixed, per_texel = TEXTURED_BYTES if textured_texels(job) else (0.0, 0.0)
+        return bake_bytes(texels, job.settings.solver, kind, paths) + fixed + per_texel * texels
 
     def _bytes_for_light(self, job: BakeJob) -> int:
         """Memory that is left for the light that the fft solver keeps, bytes; 0: no limit."""
@@ -165,6 +170,12 @@ BAKE_STEPS = (Simulate(), Solve())
 def _noisy(name: str, noise: float) -> Message:
     text = f"The light on '{name}' has a noise of {100 * noise:.0f} %, since few rays find it."
     return note(name, text, "Raise Samples.")
+
+
+def textured_texels(job: BakeJob) -> int:
+    """Texels in which light scatters by albedos of their own."""
+    grids = (chart.grid for chart in job.receiver.charts)
+    return sum(grid.texels for grid in grids if grid.base_color is not None or grid.albedo is not None)
 
 
 def needs_medium(settings: BakeSettings) -> bool:
