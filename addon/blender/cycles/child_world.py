@@ -128,6 +128,7 @@ def set_up(studio, width: int, height: int) -> None:
     render_settings.image_settings.color_mode = "RGB"
     render_settings.image_settings.color_depth = "32"
     cycles.use_denoising = cycles.use_adaptive_sampling = False
+    cycles.use_auto_tile = False  # tiles go through a file, which takes as long as the panorama, and hide the samples
     cycles.film_exposure = 1.0
     cycles.sample_clamp_direct = cycles.sample_clamp_indirect = 0.0
     cycles.pixel_filter_type = "BOX"
