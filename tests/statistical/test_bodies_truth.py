@@ -5,22 +5,22 @@ import functools
 import numpy as np
 import pytest
 from beamspread import Medium, library
+from beamspread.core.bake.layers import TOLERANCE
 
 from body_samples import samples
 from body_tables import ALBEDOS, BODIES, body_table
 
 # Mean free paths between samples, and the largest errors of totals and L1 distances, per cent, at albedo .6 and from
-# .9 to .97. On the block the error is the method's: pairs across an edge see no ball. Light at a slant to a cylinder's
-# axis winds around it, where pairs see balls, too.
+# .9 to .97, at the tolerance of bakes. On the block the error is the method's: pairs across an edge see no ball.
 BOUNDS = {
-    "ball_4": (1.0, (1.0, 1.0), (1.5, 1.0)),
-    "ball_6": (1.0, (1.0, 1.0), (1.2, 1.0)),
+    "ball_4": (1.0, (1.0, 0.8), (1.5, 1.0)),
+    "ball_6": (1.0, (1.0, 0.8), (1.2, 1.0)),
     "ball_20": (2.0, (1.0, 1.0), (1.0, 1.0)),
     "cylinder_6": (1.0, (1.0, 1.0), (1.0, 1.2)),
     "cylinder_20": (2.0, (1.0, 0.6), (1.0, 0.6)),
-    "cylinder_slant_6": (1.0, (1.5, 1.8), (1.5, 1.8)),
+    "cylinder_slant_6": (1.0, (1.2, 1.2), (1.2, 1.2)),
     "cylinder_isotropic_6": (0.5, (1.2, 1.2), (1.5, 2.5)),
-    "hollow_6": (1.0, (1.0, 1.2), (1.0, 1.2)),
+    "hollow_6": (1.0, (1.0, 1.0), (1.0, 1.0)),
     "hollow_20": (2.0, (1.0, 0.8), (1.0, 0.8)),
     "block_12": (1.0, (5.0, 4.5), (6.5, 6.0)),
     "torus_6": (1.5, (1.0, 0.8), (1.0, 1.0)),
@@ -44,7 +44,7 @@ def luminance(name, texel, albedos):
     body, g = BODIES[name]
     lit = samples(body, texel)
     media = [library_of(g)] * len(albedos), list(albedos), [1.0] * len(albedos)
-    field = SurfaceField(rows_of(lit), *media, steps=lit.steps)
+    field = SurfaceField(rows_of(lit), *media, steps=lit.steps, tolerance=TOLERANCE)
     field.add(lit.travel, np.repeat(lit.irradiance[:, None], 3, 1), [1.0] * len(albedos))
     return lit, field.solve()
 

@@ -18,6 +18,7 @@ constexpr float disk_end_radii = 8.0f;
 constexpr float disk_first_radii = 1.0f;
 
 // Fraction of the tolerance that functions may have where they are left out. Larger: less time for light far away.
+// The first block always stays: what it lacks far away has one sign and adds up over the surface.
 constexpr double block_share = 0.5;
 
 // Least chord, in radii of a disk, at which curvatures are compared: both profiles are infinite at the pole.
@@ -96,7 +97,7 @@ void choose_blocks(const SurfaceBasis& basis, double tolerance, PointTable& tabl
                 }
                 for (std::size_t b = 0; b < blocks; ++b) {
                     beyond[b] += octave * power[b];
-                    if (beyond[b] > block_share * tolerance * all)
+                    if (b == 0 || beyond[b] > block_share * tolerance * all)
                         table.blocks[row] = std::max(table.blocks[row], static_cast<std::uint8_t>(b + 1));
                 }
             }
