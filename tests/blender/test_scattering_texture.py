@@ -3,10 +3,11 @@
 import bpy
 import numpy as np
 import pytest
-from beamspread import Medium, albedo_from_color, luminance
+from beamspread import Medium, albedo_from_color, library, luminance
 from beamspread.blender.jobs.state import state
+from beamspread.core.ldf.reflectance_table import reflectance_table
 from beamspread.core.material import Material
-from scenes import add_material, add_plane, add_sun, bake, node_of
+from scenes import add_material, add_mesh, add_plane, add_sun, bake, node_of
 
 SIZE, SIDE, ANGLE = 48, 2.0, 30
 PATH = SIDE / SIZE
@@ -99,3 +100,45 @@ def test_setting_the_blur_chooses_the_convention():
     node = node_of(add_material())
     node.texture_blur = 0.2
     assert node.texture_method == "MULTIPLIED"
+
+
+def test_planes_of_one_mesh_have_their_parts_of_the_texture():
+    """Two squares, one higher, side by side in the image: each is as a plane of its own by a script."""
+    bpy.context.scene.beamspread.resolution, bpy.context.scene.beamspread.margin = SIZE, 0
+    add_sun(0)
+    state.forget()
+    corners = [(x + dx, dy, z) for x, z in ((-1, 0), (4, 1)) for dx, dy in ((-1, -1), (1, -1), (1, 1), (-1, 1))]
+    uvs = [(u + du / 2, v) for u in (0.0, 0.5) for du, v in ((0, 0), (1, 0), (1, 1), (0, 1))]
+    obj = add_mesh("Squares", corners, [(0, 1, 2, 3), (4, 5, 6, 7)], uvs=uvs)
+    material = add_material(color_mode="BASE_COLOR", mean_free_path=(PATH,) * 3, anisotropy=G, ior=IOR)
+    obj.data.materials.append(material)
+    colors = stripes(*COLORS, period=6)
+    colors[:, SIZE // 2 :] = stripes((0.5, 0.5, 0.5), (0.75, 0.7, 0.6), period=8)[:, SIZE // 2 :]
+    image = add_texture(material, colors)
+    node_of(material).image = bpy.data.images.new("Result", SIZE, SIZE, float_buffer=True)
+    found = bake(obj)[0]
+    assert image.size[0] == found.shape[1]
+    table = reflectance_table(library(Medium(G, IOR)))
+    medium = Material(albedo=(0.5,) * 3, mean_free_path=(PATH,) * 3, anisotropy=G, ior=IOR)
+    for half in (np.s_[:, : SIZE // 2], np.s_[:, SIZE // 2 :]):
+        light, albedo = np.ones((SIZE, SIZE // 2)), table.albedo(colors[half])
+        truth = luminance(light, (0.0, 0.0, -1.0), medium, (2 * PATH, PATH), albedo=albedo)
+        assert distance(found[half], truth) < SAME
+
+
+def test_a_mesh_that_bends_multiplies_and_says_so():
+    bpy.context.scene.beamspread.resolution = 16
+    add_sun(0)
+    state.forget()
+    steps = np.linspace(-0.8, 0.8, 9)
+    corners = [(np.sin(turn), y, np.cos(turn)) for turn in steps for y in (-0.5, 0.5)]
+    faces = [(2 * i, 2 * i + 2, 2 * i + 3, 2 * i + 1) for i in range(8)]
+    uvs = [(i / 8 + du / 8, v) for i in range(8) for du, v in ((0, 0), (1, 0), (1, 1), (0, 1))]
+    obj = add_mesh("Arch", corners, faces, uvs=uvs)
+    for polygon in obj.data.polygons:
+        polygon.use_smooth = True
+    material = add_material(color_mode="BASE_COLOR", mean_free_path=(0.1,) * 3)
+    obj.data.materials.append(material)
+    add_texture(material, stripes(*COLORS))
+    bake(obj)
+    assert any("multiplies light" in line and "it bends" in line for line in state.lines())
