@@ -5,7 +5,7 @@ import functools
 import numpy as np
 import pytest
 from beamspread import Medium, library
-from beamspread.core.bake.layers import TOLERANCE
+from beamspread.core.bake.spread_light import TOLERANCE
 
 from body_samples import samples
 from body_tables import ALBEDOS, BODIES, body_table
