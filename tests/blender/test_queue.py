@@ -66,7 +66,7 @@ def test_to_read_the_scene_changes_no_material():
     try:
         queue()
         assert not changed
-        node_of(bpy.data.materials["Known"]).texture_blur = 0.3  # by a script, which tells Blender nothing
+        node_of(bpy.data.materials["Known"]).edges = "MIRROR"  # by a script, which tells Blender nothing
         queue()
         assert "Known" in changed
     finally:

@@ -102,6 +102,17 @@ def test_setting_the_blur_chooses_the_convention():
     assert node.texture_method == "MULTIPLIED"
 
 
+def test_nodes_of_older_files_keep_the_convention(plane):
+    """They have no value for the method: the bake is that of the method by name."""
+    material = plane.data.materials[0]
+    add_texture(material, stripes(*COLORS))
+    node_of(material).texture_method = "MULTIPLIED"
+    by_name = bake(plane)[0].copy()
+    node_of(material).texture_method = "SCATTERED"
+    node_of(material).property_unset("texture_method")
+    assert bake(plane)[0] == pytest.approx(by_name, rel=1e-6)
+
+
 def test_planes_of_one_mesh_have_their_parts_of_the_texture():
     """Two squares, one higher, side by side in the image: each is as a plane of its own by a script."""
     bpy.context.scene.beamspread.resolution, bpy.context.scene.beamspread.margin = SIZE, 0

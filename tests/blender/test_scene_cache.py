@@ -238,6 +238,10 @@ CHANGES = {
         lambda: setattr(scenes.node_of(bpy.data.materials["Medium"]), "texture_blur", 0.9),
         "material",
     ),
+    "method of the texture": (
+        lambda: setattr(scenes.node_of(bpy.data.materials["Medium"]), "texture_method", "MULTIPLIED"),
+        "material",
+    ),
     "receiver moved": (lambda: move("Plane"), "object"),
     "receiver's UVs": (other_uvs, "object"),
     "size of the image": (lambda: scenes.image_of(bpy.data.objects["Plane"]).scale(16, 16), "size of the image"),
