@@ -77,3 +77,23 @@ def test_exitance_agrees_with_the_tables(name):
     for values, (low_albedo, high_albedo) in zip(measured, bounds):
         assert abs(values[0]) < low_albedo
         assert (np.abs(values[1:]) < high_albedo).all()
+
+
+# Sides of a shell, its bins in the table, and the largest errors of totals, per cent, at albedo .6 and above.
+@pytest.mark.parametrize(("side", "face", "bounds"), [("reflected", 0, (11, 12.5)), ("transmitted", 1, (19, 12.5))])
+def test_a_shell_as_a_flat_slab(side, face, bounds):
+    """Slabs have no LDFs of shells: what bends cost at a radius of 6 and a thickness of 1 transport mean free path."""
+    from _native_test import SurfaceField
+
+    body, g = BODIES["shell_6"]
+    ldf, lit = library(Medium(g=g, ior=1.0, thickness=body.radius - body.inner), "preview"), samples(body, 1.0)
+    areas = body.areas.reshape(2, body.faces)
+    for albedos in (ALBEDOS[:3], ALBEDOS[3:]):
+        media = [ldf] * len(albedos), list(albedos), [1.0] * len(albedos)
+        field = SurfaceField(rows_of(lit), *media, steps=lit.steps, tolerance=TOLERANCE, side=side)
+        field.add(lit.travel, np.repeat(lit.irradiance[:, None], 3, 1), [1.0] * len(albedos))
+        for albedo, values in zip(albedos, field.solve().T):
+            exact = body_table("shell_6")[albedo][0].reshape(2, body.faces)[face]
+            returned = (lit.exitance(values, body.faces) * areas[0]).sum()  # samples lie on the outer face
+            error = 100 * (returned / (exact * areas[face]).sum() - 1)
+            assert abs(error) < bounds[albedo > 0.6], error
