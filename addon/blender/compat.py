@@ -181,6 +181,13 @@ def uses_nodes(material) -> bool:
     return bpy.app.version >= (5, 0, 0) or material.use_nodes
 
 
+def lamp_uses_nodes(lamp) -> bool:
+    """True if a lamp uses its node tree (in Blender 5.2 every lamp does, and asking is deprecated)."""
+    if lamp.node_tree is None:
+        return False
+    return bpy.app.version >= (5, 2, 0) or lamp.use_nodes
+
+
 def has_transparent_shadow(material) -> bool:
     """True if shadows of the material are transparent in Cycles (Blender 4.2 moved the switch to the material)."""
     owner = material if hasattr(material, "use_transparent_shadow") else getattr(material, "cycles", None)

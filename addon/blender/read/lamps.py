@@ -72,7 +72,7 @@ def read_lamp(obj, matrix) -> tuple[Light | None, NotSupportedError | None]:
     """The light, None if it is dark, and the reason why its nodes are ignored, if so."""
     data, axes = obj.data, np.array(matrix, dtype=float)
     color, reason = np.array(compat.light_color(data)), None
-    if data.use_nodes and data.node_tree is not None:
+    if compat.lamp_uses_nodes(data):
         surface = surface_of(data.node_tree)
         try:
             color = color * (0 if surface is None else ShadingPoints().value(surface))

@@ -74,7 +74,7 @@ class ObjectDigests:
 
     def _lamp(self, obj, matrix: Matrix) -> int:
         light, reason = read_lamp(obj, matrix)
-        tree = self._noted(scene_cache.tree(obj.data)) if obj.data.use_nodes else TreeDigest()
+        tree = self._noted(scene_cache.tree(obj.data)) if compat.lamp_uses_nodes(obj.data) else TreeDigest()
         return _number(light and replace(light, name=""), reason and tree.text, self._links(obj))
 
     def _links(self, obj) -> list:
