@@ -66,7 +66,8 @@ public:
     struct Opening {
         float size = 0.0f;         // root of the largest size over the distance; 0: `bound` decides
         std::uint32_t first = 0;   // step of the first chord of `bound`
-        std::vector<float> bound;  // [chord]: 1 / (size times weight of a far cluster), 1 / m^2; empty: none is far
+        std::vector<float> bound;  // [chord]: 1 / (a far cluster's weight times fourth power of its size, m^2, over
+                                   // its squared distance); empty: none is far
     };
 
     // Finds the sources of a leaf; light from beyond `reach` (metres) is left out.
