@@ -18,9 +18,7 @@ from ..bake.textured_bake import (
     NOISY,
     QUICK_EFFORT,
     corrected,
-    multiplied_note,
     noisy_note,
-    why_multiplied,
     with_factors,
 )
 from ..errors import BakeError
@@ -30,13 +28,11 @@ from ..material import Material
 from ..messages import Message
 from ..progress import Progress
 from ..recent import keep_recent
-from ..scene.bent_grid import AnyGrid
-from ..scene.chart import Chart
 from ..scene.flat_mesh import FlatMesh, flatten
 from ..scene.grid import Grid
 from ..scene.illumination import Illumination
 from ..scene.lights import Light, WorldLight
-from ..scene.receiver import Receiver, build_receiver, texture_size
+from ..scene.receiver import build_receiver, texture_size
 from ..scene.sampling import resized
 from ..target import Target
 from .bounced_layer import BOUNCED_SIDE, BouncedLayers, with_bounced, without_direct
@@ -44,6 +40,7 @@ from .framed_receiver import FramedReceiver
 from .kernel_cache import MAX_FIELDS, KernelCache
 from .library_service import LibraryService
 from .live_target import LiveTarget
+from .live_texture import is_scattered, texture_notes, textured
 
 SIDES = 64, 128, 256, 512
 """Texels along the longer side of quick renderings."""
@@ -169,7 +166,7 @@ class LiveRenderer:
         news = [message for message in illumination.messages if message not in target.illumination.messages]
         if max(noises) > NOISY * FINAL_EFFORT.noise:
             news.append(noisy_note(name, max(noises)))
-        notes = self._texture_notes(target, framed)
+        notes = texture_notes(target, framed.receiver)
         messages = (*self._mesh(target).messages, *edges, *limits, *notes, *news)
         return Rendering(target.target, texture, framed, is_exact=True, messages=messages)
 
@@ -251,7 +248,7 @@ class LiveRenderer:
         if whole.color_out is not None:
             # At all texels, so that the texture keeps its detail.
             resized_texture = resized_texture * whole.color_out
-        messages = *self._mesh(target).messages, *self._texture_notes(target, whole)
+        messages = *self._mesh(target).messages, *texture_notes(target, whole.receiver)
         return Rendering(target.target, resized_texture, whole, messages=messages)
 
     def _quick_luminance(self, grid: Grid, spreading: Spreading, progress) -> np.ndarray:
@@ -287,42 +284,20 @@ class LiveRenderer:
             keep_recent(self._meshes, key, (polygons, mesh), MAX_RECEIVERS)
         return self._meshes[key][1]
 
-    def _textured(self, target: LiveTarget, receiver: Receiver) -> Receiver:
-        """The receiver with the texture, and with its factors for light that enters and leaves."""
-        texture = target.texture
-        if not texture.use.is_scattered:
-            return texture.on(receiver)
-        if why_multiplied(receiver, target.settings):
-            return target.surface.multiplied(texture).on(receiver)
-        receiver = texture.on(receiver)
-        grids, _ = with_factors([chart.grid for chart in receiver.charts], *self._material(target))
-        return replace(receiver, charts=tuple(map(_with_grid, receiver.charts, grids)))
-
-    def _texture_notes(self, target: LiveTarget, framed: FramedReceiver) -> tuple[Message, ...]:
-        """Notes about a texture that can't scatter light."""
-        is_scattered = target.texture is not None and target.texture.use.is_scattered
-        why = why_multiplied(framed.receiver, target.settings) if is_scattered else ""
-        return (multiplied_note(target.target.object_name, why),) if why else ()
-
     def _receiver(self, target: LiveTarget, size: tuple[int, int]) -> FramedReceiver:
         mesh = self._mesh(target)
         side, settings = target.target.side, target.settings
         key = id(mesh), id(target.texture), side, size, settings.margin, settings.margin_type
-        is_scattered = target.texture is not None and target.texture.use.is_scattered
-        if is_scattered:  # factors depend on the medium
+        if is_scattered(target):  # factors depend on the medium
             key = *key, settings.distributions, *map(id, self._material(target)[1])
         if key not in self._receivers:
             receiver = build_receiver(mesh, *size, target.target.object_name)
             receiver = with_seams(receiver, mesh, settings).seen_from(side)
             if target.texture is not None:
-                receiver = self._textured(target, receiver)
+                receiver = textured(target, receiver, *self._material(target))
             framed = FramedReceiver(receiver, settings.margin)
             keep_recent(self._receivers, key, (framed, mesh, target.texture), MAX_RECEIVERS)
         return self._receivers[key][0]
-
-
-def _with_grid(chart: Chart, grid: AnyGrid) -> Chart:
-    return replace(chart, grid=grid)
 
 
 def _media(target: LiveTarget) -> list:
