@@ -175,7 +175,7 @@ py::dict bounced_light(const std::vector<py::object>& grids, const Numbers& stra
                        const std::vector<std::tuple<const Light*, Numbers, const Occluders*>>& lights,
                        const Occluders* occluders, double direct, double tolerance,
                        const std::variant<int, std::array<int, 3>>& max_bounces, std::uint32_t seed, int threads,
-                       const py::object& callback, double spread, int max_samples)
+                       const py::object& callback, double spread, int max_samples, double max_rays)
 {
     std::vector<NodeGrid> node_grids;
     for (const py::object& grid : grids)
@@ -196,6 +196,7 @@ py::dict bounced_light(const std::vector<py::object>& grids, const Numbers& stra
                                    .spread = spread,
                                    .limits = {.all = all, .diffuse = diffuse, .glossy = glossy},
                                    .max_samples = max_samples,
+                                   .max_rays = max_rays,
                                    .seed = seed,
                                    .threads = threads};
     Progress progress(progress_callback(callback));
@@ -415,7 +416,7 @@ Cancelled
     m.def("bounced_light", &bounced_light, py::arg("grids"), py::arg("strata"), py::arg("lights"), py::arg("occluders"),
           py::arg("direct"), py::arg("tolerance") = 0.01, py::arg("max_bounces") = 12, py::arg("seed") = 0,
           py::arg("threads") = 0, py::arg("progress") = py::none(), py::arg("spread") = 0.0,
-          py::arg("max_samples") = BouncedSettings{}.max_samples,
+          py::arg("max_samples") = BouncedSettings{}.max_samples, py::arg("max_rays") = BouncedSettings{}.max_rays,
           R"(Light that surfaces reflect to receivers, by path tracing with next-event estimation.
 
 Parameters
@@ -445,6 +446,8 @@ spread : float
     Radius, metres, over which the medium averages light: noise counts as its mean over that distance.
 max_samples : int
     Largest number of paths from each node in each part of the hemisphere.
+max_rays : float
+    About the largest number of rays along all paths, shadow rays not counted.
 
 Returns
 -------

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <array>
+#include <atomic>
 #include <cmath>
 #include <memory>
 #include <string>
@@ -61,6 +62,8 @@ public:
 
     std::size_t samples() const { return m_samples; }
     std::size_t row_count() const { return m_rows.size(); }
+    // Number of rays along paths so far.
+    std::size_t rays() const { return m_rays; }
 
     // Learns which lights matter, and how their light comes in if something blocks most of it.
     void learn_lights()
@@ -210,6 +213,7 @@ private:
             }
             wave.trace(radiance);
         }
+        m_rays += wave.rays();
         std::vector<Vec3f>& sums = m_sums[half][at.grid];
         for (std::size_t slot = 0; slot < radiance.size(); ++slot)
             sums[slot / grid.columns * grid.nodes() + at.row * grid.columns + slot % grid.columns] += radiance[slot];
@@ -225,6 +229,7 @@ private:
     std::array<std::vector<std::vector<Vec3f>>, 2> m_sums;  // [half][grid][stratum][row][column]
     std::vector<Row> m_rows;
     std::size_t m_samples = 0;  // of each half
+    std::atomic<std::size_t> m_rays{0};
 };
 
 // Irradiance of a grid's nodes, the mean of the channels, W/m^2.
@@ -294,6 +299,8 @@ void check(std::span<const NodeGrid> grids, std::span<const Stratum> strata, con
             reject("max_bounces", limit, "0 or more");
     if (settings.max_samples < 2)
         reject("max_samples", settings.max_samples, "2 or more");
+    if (!(settings.max_rays > 0.0))
+        reject("max_rays", settings.max_rays, "above 0");
 }
 
 }  // namespace
@@ -360,7 +367,9 @@ BouncedLight trace_bounced_light(std::span<const NodeGrid> grids, std::span<cons
             // The variance falls in proportion to the number of samples.
             const double ratio = result.noise / settings.tolerance;
             const double needed = std::ceil(static_cast<double>(tracer.samples()) * ratio * ratio);
-            wanted = static_cast<std::size_t>(std::min(needed, static_cast<double>(most)));
+            const double affordable = static_cast<double>(tracer.samples()) * settings.max_rays /
+                                      static_cast<double>(std::max<std::size_t>(tracer.rays(), 1));
+            wanted = static_cast<std::size_t>(std::min({needed, affordable, static_cast<double>(most)}));
         }
         for (std::size_t n = 0; n < grids.size(); ++n)
             for (std::size_t i = 0; i < result.radiance[n].size(); ++i)

@@ -3,6 +3,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <limits>
 #include <span>
 #include <vector>
 
@@ -58,6 +59,7 @@ struct BouncedSettings {
     double spread = 0.0;
     BounceLimits limits;
     int max_samples = 128;   // paths for each stratum of a node
+    double max_rays = std::numeric_limits<double>::infinity();  // along all paths, without shadow rays
     std::uint32_t seed = 0;
     int threads = 0;  // 0: all
 };

@@ -41,6 +41,7 @@ void PathWave::trace(std::vector<Vec3f>& radiance)
 {
     std::array<SurfaceHit, Occluders::packet_size> hits;
     for (bool is_first = true; !m_paths.empty(); is_first = false) {
+        m_rays += m_paths.size();
         std::size_t left = 0;
         for (std::size_t first = 0; first < m_paths.size(); first += Occluders::packet_size) {
             const std::size_t count = std::min(Occluders::packet_size, m_paths.size() - first);

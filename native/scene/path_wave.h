@@ -45,6 +45,9 @@ public:
     // Keeps records of shadow rays for a guide; it must outlive the paths.
     void record(std::vector<GuideRecord>* records) { m_records = records; }
 
+    // Number of rays along paths so far, without shadow rays.
+    std::size_t rays() const { return m_rays; }
+
     // Traces only the first part of all paths and writes the surfaces that they meet.
     void find_first(std::vector<ShadingPoint>& points);
 
@@ -80,6 +83,7 @@ private:
     const LightChoice& m_lights;
     BounceLimits m_limits;
     std::vector<Path> m_paths;
+    std::size_t m_rays = 0;
     std::vector<std::pair<const Occluders*, Waiting>> m_waiting;
     std::vector<GuideRecord>* m_records = nullptr;
 };

@@ -25,6 +25,9 @@ from .smoothing import SPLINE_VARIANCE, smoothing_variance
 NODES = 64
 # Most paths for each part of the hemisphere at a node; more leave less noise and take longer.
 MAX_SAMPLES = 128
+# Most rays along the paths of a receiver: a core traces some 300,000 a second in rooms. More leave less noise there and
+# take longer.
+MAX_RAYS = 12e6
 # Most squares of that side that the nodes of all charts fill.
 MAX_SQUARES = 2.0
 
@@ -49,13 +52,14 @@ class BouncedLight(Step):
     Attributes
     ----------
     max_bounces : largest number of surfaces that return light on its way, in all, diffusely and by a glossy lobe.
-    nodes, tolerance, max_samples : see `NODES`, `NOISE` and `MAX_SAMPLES`.
+    nodes, tolerance, max_samples, max_rays : see `NODES`, `NOISE`, `MAX_SAMPLES` and `MAX_RAYS`.
     """
 
     max_bounces: tuple[int, int, int]
     nodes: int = NODES
     tolerance: float = NOISE
     max_samples: int = MAX_SAMPLES
+    max_rays: float = MAX_RAYS
 
     name = "Finding bounced light"
     finds_light = True
@@ -86,6 +90,7 @@ class BouncedLight(Step):
             threads=settings.threads,
             spread=_spread(job),
             max_samples=self.max_samples,
+            max_rays=self.max_rays,
             progress=progress,
         )
         if not bounced["irradiance"] > 0:
