@@ -339,6 +339,19 @@ def test_a_glowing_panel_close_to_a_wall():
     assert found[0]["paths"] < 3 * found[1]["paths"]
 
 
+def test_a_budget_of_rays_ends_the_search():
+    """At a tolerance that is out of reach, with the same bits for any number of threads."""
+    scene = native.Occluders([mesh(*sphere(12)[:2], grey(0.7))])
+    options = {"lights": [(native.PointLight((0.2, 0, 0.5)), 10.0)], "tolerance": 1e-5}
+    whole = bounced(scene, **options)
+    few, same = (bounced(scene, **options, max_rays=1e6, threads=threads) for threads in (1, 2))
+    np.testing.assert_array_equal(few["radiance"][0], same["radiance"][0])
+    # Paths in this sphere have 2 to 4 rays.
+    assert 2.5e5 < few["paths"] < 5e5 < whole["paths"]
+    assert few["noise"] > whole["noise"] > 1e-5
+    assert few["irradiance"] == pytest.approx(whole["irradiance"], abs=4 * few["noise"] * (1 + whole["irradiance"]))
+
+
 @pytest.mark.parametrize(("name", "size", "lines"), [("bounces", "2", 6), ("indirect", "24", 7)])
 def test_the_benches_run_in_small(name, size, lines):
     bench = Path(__file__).resolve().parents[1] / "bench" / f"{name}.py"

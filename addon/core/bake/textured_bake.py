@@ -68,7 +68,7 @@ class Effort:
 QUICK_EFFORT = Effort(0.1, 32, 128, 4, max_own=1, is_split=False)
 """Effort of Live while the scene changes."""
 
-NOISY = 2.0
+NOISY = 1.2
 """Noise of a texture, over the wanted one, above which a bake names it."""
 
 FINAL_EFFORT = Effort(0.02, 2048, 512, 8)

@@ -36,6 +36,9 @@ constexpr double survival_power = 1.5;
 // Largest probability to survive a scattering. Nearer to 1: longer paths in textures of little absorption.
 constexpr double max_survival = 0.9999;
 
+// Walks that show how far paths go, of all lights together. Fewer: the reach is less certain.
+constexpr std::size_t reach_walks = 4096;
+
 // Stream of random numbers of the paths.
 constexpr std::uint64_t path_stream = 0x7e87;
 
@@ -77,7 +80,7 @@ std::size_t reach_of(const std::vector<PathPlan>& plans, std::uint64_t seed)
     for (std::size_t i = 0; i < plans.size(); ++i) {
         SharedPaths paths;
         Random random(seed, path_stream, ~static_cast<std::uint64_t>(i));
-        add_paths(paths, plans[i], 4096, random);
+        add_paths(paths, plans[i], (reach_walks + plans.size() - 1) / plans.size(), random);
         for (std::size_t p = 0; p < paths.size(); ++p) {
             std::int32_t most = 0;
             for (std::size_t k = paths.first[p]; k < paths.first[p + 1]; ++k)
