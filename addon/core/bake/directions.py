@@ -24,6 +24,9 @@ MAX_OWN = 3
 STEEP = 6.0
 """Angle from the normal, degrees, up to which azimuths do not count. Larger: fewer paths."""
 
+DIGITS = 7
+"""Digits of directions that count. More: last bits that depend on the C library of the process."""
+
 Beams = list[tuple[NDArray[np.float32], NDArray[np.float64]]]
 """Irradiance (H, W, 3), and the direction of travel of each."""
 
@@ -66,7 +69,7 @@ class DirectionClasses:
             values.ravel() for values in np.meshgrid(*map(np.radians, (self.angles, self.azimuths)), indexing="ij")
         )
         sine = np.sin(theta)
-        return list(np.stack([sine * np.cos(phi), sine * np.sin(phi), -np.cos(theta)], -1))
+        return list(np.round(np.stack([sine * np.cos(phi), sine * np.sin(phi), -np.cos(theta)], -1), DIGITS))
 
     def weights(self, way: NDArray) -> Iterator[NDArray]:
         """Weights (...) of each class for directions (..., 3); they add up to 1."""
@@ -93,7 +96,7 @@ def direction_of(power: NDArray, way: NDArray) -> NDArray | None:
         return None
     mean = np.einsum("n,nc->c", power.ravel(), way.reshape(-1, 3), dtype=float) / total
     length = float(np.linalg.norm(mean))
-    return mean / length if length > np.cos(np.radians(NARROW)) else None
+    return np.round(mean / length, DIGITS) if length > np.cos(np.radians(NARROW)) else None
 
 
 def beams_of(lights: Iterable[tuple[NDArray, NDArray]]) -> Beams:
@@ -177,7 +180,7 @@ def _quantiles(values: NDArray, weights: NDArray) -> tuple[float, float]:
 def _azimuth_nodes(values: NDArray, weights: NDArray) -> tuple[tuple[float, ...], bool]:
     """Azimuths, degrees, ascending; True if they go around."""
     turns = np.exp(1j * np.radians(values))
-    middle = float(np.degrees(np.angle((weights * turns).sum())))
+    middle = round(float(np.degrees(np.angle((weights * turns).sum()))), 2)  # see `DIGITS`
     low, high = _quantiles((values - middle + 180) % 360 - 180, weights)
     if high - low < NARROW:
         return (middle + (low + high) / 2,), False

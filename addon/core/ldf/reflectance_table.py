@@ -17,6 +17,9 @@ NODES = 32
 STEPS = 2048
 """Points of the table, between which it is linear in the root of 1 - albedo. More: smaller errors."""
 
+DIGITS = 10
+"""Digits of the reflectances that count. More: last bits that differ from process to process."""
+
 
 class ReflectanceTable:
     """Reflectance under uniform diffuse light for each albedo from 0 to `MAX_ALBEDO`.
@@ -30,8 +33,10 @@ class ReflectanceTable:
         ends = [(1 - MAX_ALBEDO) ** 0.5, 1.0]
         known = np.polynomial.Chebyshev.interpolate(lambda roots: reflectances(1 - roots**2), NODES - 1, domain=ends)
         self._roots = np.linspace(*ends, STEPS)
-        # Rounding may leave the darkest end below 0.
-        self._reflectances = np.maximum(np.minimum.accumulate(known(self._roots)), 0.0)
+        # The last bits of the polynomial depend on the process, by the BLAS that it has loaded; results should not. And
+        # rounding may leave the darkest end below 0.
+        values = np.round(known(self._roots), DIGITS)
+        self._reflectances = np.maximum(np.minimum.accumulate(values), 0.0)
 
     @property
     def ends(self) -> tuple[float, float]:
