@@ -26,6 +26,7 @@ def fresh(tmp_path, monkeypatch):
     monkeypatch.setenv("BEAMSPREAD_CACHE", str(tmp_path / "cache"))
     monkeypatch.setattr(timer, "messages", list)
     pace.forget()
+    state.factors.clear()
     bpy.context.scene.beamspread.resolution = 256
     yield
     pace.forget()
