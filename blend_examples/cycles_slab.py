@@ -107,11 +107,12 @@ def add_sheet():
     return sheet
 
 
-def add_ghost():
+def add_ghost(low, high, columns, rows):
+    """A ghost over a rectangle and the image that its light is baked to; it alone is selected."""
     # One triangle holds the whole texture: Cycles mirrors samples of a texel that leave the triangle of its centre,
     # which in texels that a quad's diagonal crosses moves them far along u.
-    half_v = HALF_RANGE * ROWS / BINS
-    corners = [(-HALF_RANGE, -half_v, 0), (-HALF_RANGE, 3 * half_v, 0), (3 * HALF_RANGE, -half_v, 0)]  # normal down
+    (x, y), (width, depth) = low, (high[0] - low[0], high[1] - low[1])
+    corners = [(x, y, 0), (x, y + 2 * depth, 0), (x + 2 * width, y, 0)]  # normal down
     ghost = mesh_object("Ghost", corners, [(0, 1, 2)], [(0, 0), (0, 2), (2, 0)])
     ghost.location.z = GHOST_HEIGHT
     ghost.visible_camera = ghost.visible_diffuse = ghost.visible_transmission = False
@@ -119,12 +120,12 @@ def add_ghost():
     white = material("White", diffuse_nodes(1.0))
     ghost.data.materials.append(white)
     target = white.node_tree.nodes.new("ShaderNodeTexImage")
-    image = bpy.data.images.new("Profile", BINS, ROWS, float_buffer=True, is_data=True)
-    target.image = image
+    target.image = bpy.data.images.new("Exitance", columns, rows, float_buffer=True, is_data=True)
     white.node_tree.nodes.active = target
-    ghost.select_set(True)
+    for obj in bpy.context.scene.objects:
+        obj.select_set(obj == ghost)
     bpy.context.view_layer.objects.active = ghost
-    return image
+    return ghost, target.image
 
 
 def set_up_cycles(samples):
@@ -200,7 +201,9 @@ def build_scene(samples):
     set_up_cycles(samples)
     add_slab()
     add_sun()
-    return add_sheet(), add_ghost()
+    half_v = HALF_RANGE * ROWS / BINS
+    sheet, (_, image) = add_sheet(), add_ghost((-HALF_RANGE, -half_v), (HALF_RANGE, half_v), BINS, ROWS)
+    return sheet, image
 
 
 def main():

@@ -67,28 +67,13 @@ def scene_of(albedo, samples):
     box = bpy.context.object
     box.data.materials.clear()
     box.data.materials.append(medium_of(albedo))
-    box.select_set(False)
     # Steps are a tenth of the mean side of a box, times the rate.
     sides = 2 * slab.SLAB_WIDTH + slab.SLAB_DEPTH
     bpy.context.scene.cycles.volume_step_rate = STEP / (sides / 3 / 10)
     bpy.context.scene.cycles.volume_max_steps = 4096
     slab.add_sun()
     bpy.data.objects["Sun"].rotation_euler = (0.0, math.radians(-ANGLE_DEG), 0.0)
-    # One triangle, its normal down; see cycles_slab.add_ghost.
-    ghost = slab.mesh_object(
-        "Ghost", [(0, 0, 0), (0, 2 * SIDE, 0), (2 * SIDE, 0, 0)], [(0, 1, 2)], [(0, 0), (0, 2), (2, 0)]
-    )
-    ghost.location.z = slab.GHOST_HEIGHT
-    ghost.visible_camera = ghost.visible_diffuse = ghost.visible_transmission = False
-    ghost.visible_volume_scatter = ghost.visible_shadow = False
-    white = slab.material("White", slab.diffuse_nodes(1.0))
-    ghost.data.materials.append(white)
-    target = white.node_tree.nodes.new("ShaderNodeTexImage")
-    target.image = bpy.data.images.new("Exitance", SIDE, SIDE, float_buffer=True, is_data=True)
-    white.node_tree.nodes.active = target
-    ghost.select_set(True)
-    bpy.context.view_layer.objects.active = ghost
-    return target.image
+    return slab.add_ghost((0, 0), (SIDE, SIDE), SIDE, SIDE)[1]
 
 
 def traced(albedo, samples):

@@ -26,24 +26,13 @@ def build():
         "Amber", color_mode="ALBEDO", albedo=(0.97, 0.9, 0.6), mean_free_path=(1.6 * MM,) * 3, anisotropy=0.9, ior=1.0
     )
     parts.plane("Slab", WIDTH, DEPTH, amber)
-    table()
+    wood = parts.plain_material("Table", (0.018, 0.011, 0.008), roughness=0.5, specular=0.1)
+    parts.table_around(WIDTH, DEPTH, wood)
     window()
     parts.sun("Low sun", parts.direction(ANGLE_DEG, 0), 28.0, (1.0, 0.86, 0.68))
     parts.sun("Light of the room", parts.direction(25, 110), 0.06, (0.6, 0.75, 1.0), shadow=False)
     scene.cycles.max_bounces, scene.cycles.diffuse_bounces, scene.cycles.glossy_bounces = 3, 1, 2
     parts.camera((0.0, -0.21, 0.30), (-0.007, -0.003, 0.0), lens=58)
-
-
-def table():
-    wood = parts.plain_material("Table", (0.018, 0.011, 0.008), roughness=0.5, specular=0.1)
-    x, y, far = WIDTH / 2, DEPTH / 2, 1.0
-    for name, low, high in (
-        ("left", (-far, -far), (-x, far)),
-        ("right", (x, -far), (far, far)),
-        ("front", (-x, -far), (x, -y)),
-        ("back", (-x, y), (x, far)),
-    ):
-        parts.box(f"Table {name}", (*low, -10 * MM), (*high, 0), wood)
 
 
 def window():

@@ -164,6 +164,18 @@ def box(name, low, high, material):
     return mesh_object(name, corners, faces, material)
 
 
+def table_around(width, depth, material):
+    """A table into which a slab of this size around the origin is let, flush with its top."""
+    x, y, far = width / 2, depth / 2, 1.0
+    for name, low, high in (
+        ("left", (-far, -far), (-x, far)),
+        ("right", (x, -far), (far, far)),
+        ("front", (-x, -far), (x, -y)),
+        ("back", (-x, y), (x, far)),
+    ):
+        box(f"Table {name}", (*low, -0.01), (*high, 0), material)
+
+
 def prism(name, outline, y0, y1, material):
     """A polygon (x, z) in the plane of a wall, given counter-clockwise seen from -y, thick from y0 to y1."""
     count = len(outline)

@@ -63,15 +63,8 @@ def veins():
 def surroundings():
     wood = parts.plain_material("Table", (0.018, 0.011, 0.008), roughness=0.5, specular=0.1)
     stone = parts.plain_material("Balusters", (0.16, 0.13, 0.10), roughness=0.6)
-    x, y, far = WIDTH / 2, DEPTH / 2, 1.0
-    for name, low, high in (
-        ("left", (-far, -far), (-x, far)),
-        ("right", (x, -far), (far, far)),
-        ("front", (-x, -far), (x, -y)),
-        ("back", (-x, y), (x, far)),
-    ):
-        parts.box(f"Table {name}", (*low, -10 * MM), (*high, 0), wood)
-    count, at = 7, -x - 7 * MM
+    parts.table_around(WIDTH, DEPTH, wood)
+    count, at = 7, -WIDTH / 2 - 7 * MM
     for number in range(count):
         place = at, (number - (count - 1) / 2) * 16 * MM, 0
         parts.lathe(f"Baluster {number + 1}", parts.rounded(BALUSTER), stone, place, MM)

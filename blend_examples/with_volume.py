@@ -56,30 +56,13 @@ def add_box(low, high, node):
     return box
 
 
-def add_ghost(low, high):
-    """A triangle that holds the texture, its normal down; see cycles_slab.add_ghost."""
-    (x, y), (width, depth) = low, high - low
-    corners = [(x, y, 0), (x, y + 2 * depth, 0), (x + 2 * width, y, 0)]
-    ghost = cycles_slab.mesh_object("Ghost", corners, [(0, 1, 2)], [(0, 0), (0, 2), (2, 0)])
-    ghost.location.z = cycles_slab.GHOST_HEIGHT
-    ghost.visible_camera = ghost.visible_diffuse = ghost.visible_transmission = False
-    ghost.visible_volume_scatter = ghost.visible_shadow = False
-    white = cycles_slab.material("White", cycles_slab.diffuse_nodes(1.0))
-    ghost.data.materials.append(white)
-    target = white.node_tree.nodes.new("ShaderNodeTexImage")
-    rows = round(COLUMNS * depth / width)
-    target.image = bpy.data.images.new("Exitance", COLUMNS, rows, float_buffer=True, is_data=True)
-    white.node_tree.nodes.active = target
-    return ghost, target.image
-
-
 def pixels(image):
     values = np.empty(len(image.pixels), np.float32)
     image.pixels.foreach_get(values)
     return values.reshape(image.size[1], image.size[0], image.channels)[..., :3].astype(float)
 
 
-def bake(ghost, image, samples):
+def bake(image, samples):
     """Exitance / pi of each pass."""
     scene = bpy.context.scene
     cycles, kept = scene.cycles, scene.cycles.samples
@@ -87,9 +70,6 @@ def bake(ghost, image, samples):
     # A clamp, as new scenes have one, takes from the bright rest of the light: 2 % of the stage's.
     cycles.sample_clamp_direct = cycles.sample_clamp_indirect = 0.0
     cycles.use_adaptive_sampling, cycles.samples, scene.render.bake.margin = False, samples, 0
-    for obj in scene.objects:
-        obj.select_set(obj == ghost)
-    bpy.context.view_layer.objects.active = ghost
     passes = []
     for seed in range(PASSES):
         cycles.seed = seed + 1
@@ -129,8 +109,10 @@ def main():
         corners = np.array([vertex.co[:2] for vertex in plane.data.vertices])
         plane.hide_render = True
         box = add_box(corners.min(axis=0), corners.max(axis=0), node)
-        ghost, image = add_ghost(corners.min(axis=0), corners.max(axis=0))
-        passes = bake(ghost, image, int(samples) // PASSES)
+        low, high = corners.min(axis=0), corners.max(axis=0)
+        rows = round(COLUMNS * (high[1] - low[1]) / (high[0] - low[0]))
+        ghost, image = cycles_slab.add_ghost(low, high, COLUMNS, rows)
+        passes = bake(image, int(samples) // PASSES)
         exitance = np.nanmean(passes, axis=0)
         baked = pixels(bpy.data.images.load(str(Path(ours).resolve())))
         for size in (1, BLOCK):

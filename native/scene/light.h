@@ -82,7 +82,7 @@ public:
         double density = 0.0;  // of the rays of `sample`, 1/sr
     };
 
-    // What comes from the direction of a unit vector.
+    // Light from the direction of a unit vector.
     virtual Seen seen(const Vec3& direction) const = 0;
 };
 

@@ -13,7 +13,8 @@ import time
 import numpy as np
 from beamspread import library, presets
 from beamspread.core.bake.bake_settings import BakeSettings
-from beamspread.core.bake.spread_light import Spreading, spread
+from beamspread.core.bake.spread_light import spread
+from beamspread.core.bake.spreading import Spreading
 from beamspread.core.bake.surface import channel_media
 from beamspread.core.scene.grid import Grid
 from beamspread.core.scene.illumination import Illumination

@@ -65,7 +65,7 @@ SAME = 0.025
 
 
 def test_a_new_node_scatters_light_by_the_albedo_of_each_texel(plane):
-    """As `luminance` of the albedos that give the colors; the convention is off by several times the bound."""
+    """The bake is `luminance` of the albedos that give the colors; the convention is off by several times the bound."""
     material = plane.data.materials[0]
     add_texture(material, stripes(*COLORS))
     albedo = stripes(*(albedo_from_color(color, Medium(G, IOR)) for color in COLORS))
@@ -96,7 +96,7 @@ def test_albedos_of_one_are_cut_and_said(plane):
 
 
 def test_setting_the_blur_chooses_the_convention():
-    """As scripts do that know no other way."""
+    """Scripts for older versions know no other way to choose it."""
     node = node_of(add_material())
     node.texture_blur = 0.2
     assert node.texture_method == "MULTIPLIED"

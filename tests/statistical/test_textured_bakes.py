@@ -11,7 +11,8 @@ import pytest
 from beamspread import Medium, library
 from beamspread.core.bake.bake_settings import BakeSettings
 from beamspread.core.bake.layers import arrive
-from beamspread.core.bake.spread_light import Spreading, spread_side
+from beamspread.core.bake.spread_light import spread_side
+from beamspread.core.bake.spreading import Spreading
 from beamspread.core.bake.textured_bake import with_factors
 from beamspread.core.material import Material
 from beamspread.core.progress import Progress

@@ -10,6 +10,7 @@ from beamspread.core.scene.flat_mesh import flatten
 from beamspread.core.scene.lights import AreaLight, PointLight, SunLight
 from beamspread.core.scene.polygons import Polygons
 from beamspread.core.scene.receiver import build_receiver, outline, texture_size
+from beamspread.core.scene.stretch import lengths_of_faces, pieces_of_faces
 from beamspread.core.scene.tiles import Tiling
 from beamspread.core.scene.unwrap import unwrap
 
@@ -184,3 +185,12 @@ def test_a_flat_sun_lights_texels_as_planes_of_their_normals(angle):
         plane = native.ReceiverGrid((0, 0, 0), tangent, np.cross(normal, tangent), normal, 1.0, 1.0, 1, 1)
         expected, _ = native.bake_arrival(native.Surface(plane), [(sun, white, None)], samples=1, rays=16)
         assert irradiance[row, column, 0] == pytest.approx(expected[0, 0, 0], abs=1e-4)
+
+
+def test_the_sides_of_an_image_by_faces_are_those_by_triangles():
+    """Within 1 %: quads stand for both of their triangles."""
+    _, _, mesh = grid_of(ball())
+    (island,) = mesh.islands
+    assert lengths_of_faces(ball()) == pytest.approx(island.lengths, rel=0.01)
+    (chart,) = build_receiver(mesh, *texture_size(mesh, 96)).charts
+    assert pieces_of_faces(ball()) == pytest.approx(chart.grid.pieces, rel=0.1)  # which has few texels at the poles

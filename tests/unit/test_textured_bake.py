@@ -8,8 +8,9 @@ import numpy as np
 import pytest
 from beamspread import Medium, convolve, library
 from beamspread.core.bake.directions import Splitter
+from beamspread.core.bake.spreading import FINAL_EFFORT
 from beamspread.core.bake.surface import Surface
-from beamspread.core.bake.textured_bake import FINAL_EFFORT, arriving_beams, continued
+from beamspread.core.bake.textured_bake import arriving_beams, continued
 from beamspread.core.ldf.reflectance_table import exact_table, reflectance_table
 from beamspread.core.material import Material
 from beamspread.core.scene.illumination import Illumination
@@ -48,7 +49,7 @@ SAME = 0.02
 
 
 def test_a_hole_is_dark_and_lets_light_leave():
-    """As a script's plane whose irradiance is 0 there; the albedo in the hole is that around it."""
+    """A script gets the same by an irradiance of 0 in the hole and the albedo around it."""
     coverage = np.ones((SIZE, SIZE), np.float32)
     coverage[8:20, 8:20] = 0
     wild = STRIPES.copy()

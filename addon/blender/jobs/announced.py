@@ -64,7 +64,7 @@ def announce(context, targets: list[Target]) -> dict[Target, Announced]:
         if shape.error is not None:
             state.refused[target] = shape.error
         bent_materials.update([target.material_name] if shape.is_bent else [])
-        grid = grid_of(bakes[0], _side(bakes[0], shape, scene)) if shape.length else None
+        grid = grid_of(bakes[0], shape, _side(bakes[0], shape, scene)) if shape.length else None
         forecast = None if grid is None else facts.forecast(bakes[0], grid, shape)
         if forecast is not None:
             bake = _announced(target, forecast, settings, facts.encloses(grid))

@@ -14,7 +14,7 @@ from ...core.scene.bent_grid import HOLLOW_SIDE, see_each_other
 from ...core.scene.flat_mesh import NO_FACES, bends
 from ...core.scene.polygons import Polygons
 from ...core.scene.receiver import Grid
-from ...core.scene.stretch import pieces_of_faces
+from ...core.scene.stretch import lengths_of_faces, pieces_of_faces
 from ...core.target import FRONT
 from ..images.facts import is_sequence
 from ..node.find import BakeTarget, uses_tiles
@@ -33,6 +33,7 @@ class Shape:
     ----------
     length : of an image's side on the surface, scene units; 0 for a surface without area, or if it is not known.
     is_bent : True if the surface bends.
+    sides : of an image on a surface that bends, scene units; only their ratio counts.
     filled : part of the image that shows the faces.
     pieces : into which a texel is divided where the surface bends, on average.
     is_hollow : True if parts of a surface that bends see each other.
@@ -41,6 +42,7 @@ class Shape:
 
     length: float = 0.0
     is_bent: bool = False
+    sides: tuple[float, float] = (1.0, 1.0)
     filled: float = 1.0
     pieces: float = 1.0
     is_hollow: bool = False
@@ -54,7 +56,6 @@ def shape_of(target: BakeTarget, depsgraph) -> Shape:
         return Shape(max(obj.dimensions), True)
     evaluated, node = obj.evaluated_get(depsgraph), target.node
     is_tiled = uses_tiles(node, target.side)
-
     surface = node.surface()
     try:
         surface.check()
@@ -72,8 +73,10 @@ def shape_of(target: BakeTarget, depsgraph) -> Shape:
                 return Shape()
             is_bent = bends(polygons, path, spread)
             filled = float(polygons.areas.sum()) / length**2
-            of_bent = (pieces_of_faces(polygons), _is_hollow(polygons)) if is_bent else ()
-            return Shape(length, is_bent, filled, *of_bent)
+            if not is_bent:
+                return Shape(length, filled=filled)
+            facts = lengths_of_faces(polygons), filled, pieces_of_faces(polygons), _is_hollow(polygons)
+            return Shape(length, is_bent, *facts)
         except BakeError as error:
             return Shape(error=error)
 
@@ -89,8 +92,8 @@ def _is_hollow(polygons: Polygons) -> bool:
     return see_each_other(middles, polygons.normals[faces], float(np.ptp(polygons.corners, axis=0).max()))
 
 
-def grid_of(target: BakeTarget, resolution: int) -> Grid | None:
-    """About the grid of a target: as if the texture covered the object's largest two sides."""
+def grid_of(target: BakeTarget, shape: Shape, resolution: int) -> Grid | None:
+    """About the grid of a target: as if the texture covered the object's largest two sides, in a plane."""
     obj, image = target.obj, target.image
     if is_sequence(image):
         return None
@@ -109,7 +112,8 @@ def grid_of(target: BakeTarget, resolution: int) -> Grid | None:
     sides = np.ptp(along, axis=0)
     if not sides.all():
         return None
-    size = np.maximum(np.rint(resolution * sides / sides.max()), 1) if image is None else np.array(image.size)
+    lengths = np.array(shape.sides) if shape.is_bent else sides
+    size = np.maximum(np.rint(resolution * lengths / lengths.max()), 1) if image is None else np.array(image.size)
     if not size.all():
         return None
     if (size[0] < size[1]) != (sides[0] < sides[1]):

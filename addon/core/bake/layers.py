@@ -13,7 +13,8 @@ from ..progress import Callback, Progress
 from ..scene.bent_grid import AnyGrid, BentGrid
 from ..scene.illumination import Illumination
 from .bake_settings import COMBINED, DIRECTION, IRRADIANCE, BakeSettings
-from .spread_light import MAX_RAYS_BY_SAMPLES, Report, Reports, Spreading, has_back, spread
+from .spread_light import MAX_RAYS_BY_SAMPLES, has_back, spread
+from .spreading import Report, Reports, Spreading
 from .surface import channel_media
 
 # Fraction of a bake's time that loading known libraries takes.

@@ -13,7 +13,8 @@ from ..scene.lights import Light, WorldLight
 OPEN_TEXELS, OPEN_RAYS = 96, 4
 # The same with shadows, for means that are right to some percent.
 SHADOW_TEXELS, SHADOW_RAYS = 48, 16
-# Rows of the world's image for these means. More: slower, where planes have different normals.
+# Rows of the world's image for these means, and for paths through textures. More: slower, where planes have different
+# normals.
 MEAN_WORLD_ROWS = 512
 
 

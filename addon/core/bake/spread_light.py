@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -13,9 +13,9 @@ from ..material import Material
 from ..native import native
 from ..progress import Callback, Progress
 from ..scene.bent_grid import AnyGrid
-from ..scene.illumination import Illumination
 from .bake_settings import COMBINED, BakeSettings
-from .textured_bake import FINAL_EFFORT, Effort, corrected, with_factors
+from .spreading import Spreading
+from .textured_bake import corrected, with_factors
 
 # Largest relative error of a texel by the solver, see `convolve`. Larger: faster. Half a per cent is invisible.
 TOLERANCE = 5e-3
@@ -29,52 +29,6 @@ MAX_STORED_BYTES = 512 << 20
 
 # Fraction of a bake's time in which light in a texture's albedos is found.
 TEXTURED_PART = 0.7
-
-Report = Callable[[float, float, float], None]
-"""Takes an area, the mean irradiance there, W/m^2, and the mean variance of it that is left in the result."""
-
-
-@dataclass(frozen=True, eq=False)
-class Reports:
-    """Functions that take facts about a result; None: nobody asks.
-
-    Attributes
-    ----------
-    noise : takes the noise of the light, averaged over the area in which the medium spreads it.
-    bend : takes the fraction of a surface that bends more than the libraries know.
-    texture : takes the noise of a texture's light, relative to its mean.
-    """
-
-    noise: Report | None = None
-    bend: Callable[[float], None] | None = None
-    texture: Callable[[float], None] | None = None
-
-
-@dataclass(frozen=True, eq=False)
-class Spreading:
-    """Light and medium of a bake.
-
-    Attributes
-    ----------
-    material : checked; its mean free path is in the units of the grids.
-    sources : LDF of each channel.
-    settings : their `quality` does not count.
-    is_slab : True if light on the face behind counts, see `has_back`.
-    bytes_for_light : largest memory, bytes, of the moments that the fft solver makes of light; 0: any.
-    rays : from each texel to all lights of a size together; 0: by the medium, see `rays_per_texel`.
-    effort : of light in a texture's albedos.
-    """
-
-    illumination: Illumination
-    material: Material
-    sources: Sequence
-    settings: BakeSettings
-    is_slab: bool = False
-    bytes_for_light: int = 0
-    seed: int = 0
-    rays: int = 0
-    reports: Reports = Reports()
-    effort: Effort = FINAL_EFFORT
 
 
 def spread(grids: Sequence[AnyGrid], spreading: Spreading, progress: Callback | None = None) -> list[np.ndarray]:

@@ -18,9 +18,9 @@ from .estimate import simulation_seconds, textured_seconds
 from .finish import finished_texture
 from .job import BakeJob, Step
 from .layers import LAYERS, WITHOUT_MEDIUM
-from .spread_light import Reports
+from .spreading import FINAL_EFFORT, Reports
 from .surface import Surface
-from .textured_bake import FINAL_EFFORT, NOISY, noisy_note
+from .textured_bake import NOISY, noisy_note
 
 SUNS, NARROW, WIDE = range(3)
 """Kinds of light: suns alone; one direction at each texel; any other."""

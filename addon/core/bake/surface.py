@@ -8,9 +8,8 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from ..ldf.albedo import albedo_from_color, albedo_from_reflectance
-from ..ldf.reflectance_table import exact_table
+from ..ldf.reflectance_table import exact_reflectances, exact_table
 from ..material import RGB, Material, check_base_color, check_thickness
-from ..native import native
 from ..progress import Callback, Progress
 from ..recent import keep_with
 from ..scene.texture import MULTIPLIED, BaseColor, Texture, TextureUse, mean_color
@@ -82,7 +81,7 @@ class Surface:
         if self.base_color is not None:
             return list(map(float, self.base_color))
         channels = zip(self.material.albedo, channel_media(self.material, self.thickness))
-        return [_exact_reflectance(medium, albedo) for albedo, medium in channels]
+        return [float(exact_reflectances(medium, [albedo])[0]) for albedo, medium in channels]
 
     def exact_albedo(self) -> list[float]:
         """Albedo of each channel that has the base color, exact and without a simulation; the inverse of `reflectance`.
@@ -95,7 +94,7 @@ class Surface:
         channels = list(zip(self.base_color, channel_media(self.material, self.thickness)))
         albedos = {
             (color, medium): albedo_from_reflectance(
-                color, lambda albedo, medium=medium: _exact_reflectance(medium, albedo)
+                color, lambda albedo, medium=medium: float(exact_reflectances(medium, [albedo])[0])
             )
             for color, medium in dict.fromkeys(channels)
         }
@@ -115,11 +114,3 @@ class Surface:
         for (color, medium), stage in zip(channels, Progress.of(progress).split([1.0] * len(self.base_color))):
             albedo.append(albedo_from_color(color, medium, quality, stage, threads)[0])
         return replace(self.material, albedo=tuple(albedo))
-
-
-def _exact_reflectance(medium, albedo: float) -> float:
-    """Diffuse reflectance of a medium under uniform diffuse light."""
-    nodes, weights = np.polynomial.legendre.leggauss(8)
-    cosines = (nodes + 1) / 2
-    reflected, _ = native.exact_totals(medium, np.degrees(np.arccos(cosines)).tolist(), [albedo])
-    return float(weights * cosines @ reflected[:, 0])

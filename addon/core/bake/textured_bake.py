@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,20 +19,16 @@ from ..scene.lights import Light, WorldLight
 from ..scene.receiver import Receiver
 from ..scene.sampling import resized
 from .bake_settings import DIRECTION, IRRADIANCE, BakeSettings
-from .directions import MAX_OWN, Beams, Splitter
+from .directions import Beams, Splitter
+from .mean_light import MEAN_WORLD_ROWS
+from .spreading import Effort, Spreading
 from .textured import Convention, TexturedPlane
-
-if TYPE_CHECKING:
-    from .spread_light import Spreading
 
 # Texels along a side at which directions of light are surveyed. More: slower, finer.
 SURVEY_TEXELS = 48
 
 # Texels along a side of mirror images in which paths are followed. More: slower; fewer: less light beyond long paths.
 MIRRORED_TEXELS = 64
-
-# Rows of the world's image for paths. More: slower, where planes have different normals.
-WORLD_ROWS = 512
 
 # Cosine of the mean angle between a light's rays at a texel and their mean, from which they count as one direction.
 # Smaller: faster, and light that goes another way.
@@ -43,36 +38,8 @@ PARALLEL = 0.99
 GRAZING = 0.05
 
 
-@dataclass(frozen=True)
-class Effort:
-    """Effort for light in a texture's albedos.
-
-    Attributes
-    ----------
-    noise : wanted root mean square error of a texel, relative to the mean. Smaller: longer.
-    max_walks : largest number of walks for each texel. More: less noise, longer.
-    texels : along a side at which light is gathered for paths. More: sharper shadows in the correction, longer.
-    rays : from each of these texels to a light of a size.
-    max_own : largest number of lights with a direction of their own.
-    is_split : True if the light of all others is split between directions; else it has its mean one.
-    """
-
-    noise: float
-    max_walks: int
-    texels: int
-    rays: int
-    max_own: int = MAX_OWN
-    is_split: bool = True
-
-
-QUICK_EFFORT = Effort(0.1, 32, 128, 4, max_own=1, is_split=False)
-"""Effort of Live while the scene changes."""
-
 NOISY = 1.2
 """Noise of a texture, over the wanted one, above which a bake names it."""
-
-FINAL_EFFORT = Effort(0.02, 2048, 512, 8)
-"""Effort of bakes."""
 
 
 def why_multiplied(receiver: Receiver, settings: BakeSettings) -> str:
@@ -192,7 +159,7 @@ def _mirrored_beams(beams: Beams, pad: tuple[int, int]) -> Beams:
 def arriving_beams(grid: AnyGrid, illumination: Illumination, settings: BakeSettings, effort: Effort) -> Beams:
     """Light of a few directions on a grid that stands for all lights, gathered at fewer texels where it has many."""
     coarse = [
-        light.coarse(WORLD_ROWS) if isinstance(light, WorldLight) else light
+        light.coarse(MEAN_WORLD_ROWS) if isinstance(light, WorldLight) else light
         for light in illumination.lights
         if not light.is_behind(grid)
     ]

@@ -62,9 +62,12 @@ def reflectance_table(library: native.LdfLibrary) -> ReflectanceTable:
 @lru_cache(maxsize=64)
 def exact_table(medium: native.Medium) -> ReflectanceTable:
     """The table of a medium without a simulation, by adding-doubling."""
+    return ReflectanceTable(lambda albedos: exact_reflectances(medium, albedos))
+
+
+def exact_reflectances(medium: native.Medium, albedos: ArrayLike) -> NDArray[np.float64]:
+    """Reflectance under uniform diffuse light for albedos (N,), by adding-doubling and Gauss's quadrature."""
     nodes, weights = np.polynomial.legendre.leggauss(8)
     cosines = (nodes + 1) / 2
     angles = np.degrees(np.arccos(cosines)).tolist()
-    return ReflectanceTable(
-        lambda albedos: (weights * cosines) @ native.exact_totals(medium, angles, albedos.tolist())[0]
-    )
+    return (weights * cosines) @ native.exact_totals(medium, angles, np.asarray(albedos, float).tolist())[0]

@@ -11,16 +11,10 @@ from ..bake.bake_settings import COMBINED, BakeSettings
 from ..bake.bent_limits import bent_messages
 from ..bake.edges import with_edges
 from ..bake.finish import finished_texture, with_seams
-from ..bake.spread_light import Reports, Spreading, has_back, spread, spread_on, spread_side
+from ..bake.spread_light import has_back, spread, spread_on, spread_side
+from ..bake.spreading import FINAL_EFFORT, QUICK_EFFORT, Reports, Spreading
 from ..bake.surface import channel_media
-from ..bake.textured_bake import (
-    FINAL_EFFORT,
-    NOISY,
-    QUICK_EFFORT,
-    corrected,
-    noisy_note,
-    with_factors,
-)
+from ..bake.textured_bake import NOISY, corrected, noisy_note, with_factors
 from ..errors import BakeError
 from ..ldf.albedo import albedo_from_reflectance
 from ..ldf.library import load_source

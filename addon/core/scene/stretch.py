@@ -21,21 +21,40 @@ def pieces_of_texels(steps_x: np.ndarray, steps_y: np.ndarray, areas: np.ndarray
 
 
 def pieces_of_faces(polygons: Polygons) -> float:
-    """The same of the texels that show some faces, by their first three corners; 1 without UVs."""
-    if polygons.uvs is None or not polygons.count:
+    """The same of the texels that show some faces in an image whose sides are as `lengths_of_faces`; 1 without UVs."""
+    steps = _steps(polygons)
+    if steps is None:
         return 1.0
+    lengths = lengths_of_faces(polygons)
+    along_u, along_v = (step / length for step, length in zip(steps[:2], lengths))
+    products = [np.einsum("nc,nc->n", a, b) for a, b in ((along_u, along_u), (along_v, along_v), (along_u, along_v))]
+    return float(np.average(_pieces(*products), weights=steps[2]))
+
+
+def lengths_of_faces(polygons: Polygons) -> tuple[float, float]:
+    """Lengths of the image's sides on some faces, root mean square over their area in it; 1 and 1 without UVs."""
+    steps = _steps(polygons)
+    if steps is None:
+        return 1.0, 1.0
+    along, up = (float(np.sqrt(np.average((step**2).sum(axis=1), weights=steps[2]))) for step in steps[:2])
+    return along, up
+
+
+def _steps(polygons: Polygons) -> tuple[np.ndarray, np.ndarray, np.ndarray] | None:
+    """Steps of the surface along u and v (N, 3), by the first three corners of faces, and areas in the map (N,)."""
+    if polygons.uvs is None or not polygons.count:
+        return None
     first = polygons.starts[:-1]
     sides = [polygons.corners[first + n] - polygons.corners[first] for n in (1, 2)]
     (u_1, v_1), (u_2, v_2) = ((polygons.uvs[first + n] - polygons.uvs[first]).T for n in (1, 2))
     area = u_1 * v_2 - u_2 * v_1
     weights = np.nan_to_num(polygons.uv_areas) * (area != 0)
     if not 0 < weights.sum() < np.inf:
-        return 1.0
-    # Steps of the surface along u and v, times the area in the map, which cancels out.
-    along_u = sides[0] * v_2[:, None] - sides[1] * v_1[:, None]
-    along_v = sides[1] * u_1[:, None] - sides[0] * u_2[:, None]
-    products = [np.einsum("nc,nc->n", a, b) for a, b in ((along_u, along_u), (along_v, along_v), (along_u, along_v))]
-    return float(np.average(_pieces(*products), weights=weights))
+        return None
+    shown = weights > 0
+    along_u = (sides[0] * v_2[:, None] - sides[1] * v_1[:, None])[shown] / area[shown, None]
+    along_v = (sides[1] * u_1[:, None] - sides[0] * u_2[:, None])[shown] / area[shown, None]
+    return along_u, along_v, weights[shown]
 
 
 def _pieces(x: np.ndarray, y: np.ndarray, xy: np.ndarray) -> np.ndarray:

@@ -109,7 +109,7 @@ private:
             for (std::size_t part = 0; part < parts_per_step; ++part) {
                 const double within = (static_cast<double>(part) + 0.5) / static_cast<double>(parts_per_step);
                 const double radius = circle(static_cast<double>(i) + within);
-                // Half of the arc that lies in the disk, and sin(2 h half) by Chebyshev's recurrence.
+                // `half` of the arc in the disk; the sines of its multiples follow by Chebyshev's recurrence.
                 const double cosine = chord > 0.0
                                           ? (radius * radius + chord * chord - disk * disk) / (2.0 * radius * chord)
                                       : radius < disk ? -1.0
