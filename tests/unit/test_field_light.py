@@ -1,5 +1,6 @@
 """Light computed elsewhere: its strata, its interpolation, and bakes of it against the light that it stands for."""
 
+import re
 from dataclasses import replace
 
 import numpy as np
@@ -14,10 +15,12 @@ from beamspread.core.material import Material
 from beamspread.core.native import native
 from beamspread.core.scene.chart import Chart, ChartIsland
 from beamspread.core.scene.illumination import Illumination
-from beamspread.core.scene.lights import DIRECTIONS, STRATA, WEIGHTS, Field, FieldLight, WorldLight
+from beamspread.core.scene.lights import DIRECTIONS, STRATA, WEIGHTS, AreaLight, Field, FieldLight, WorldLight
+from beamspread.core.scene.occluders import Mesh
 from beamspread.core.scene.receiver import Receiver
 
-from bakes import bake, square
+from bakes import SETTINGS, bake, bake_job, square
+from shapes import FACES
 
 WHITE = 1.0, (1.0, 1.0, 1.0), True
 
@@ -185,6 +188,34 @@ def test_a_job_bakes_the_light_that_it_finds():
     assert seen == [receiver]
     with pytest.raises(native.Cancelled):
         job.run(lambda _fraction: False)
+
+
+def test_noise_counts_all_light():
+    """A lamp that is seen through a hole lacks rays; other light hides its noise in proportion."""
+    grid = square(48, 4.0)
+    lamp = AreaLight("Lamp", 1.0, (1.0, 1.0, 1.0), True, (0.0, 0.0, 2.0), np.eye(3), 1.0, 1.0, False, np.pi)
+    hole = [(-3, -0.05, -3, 3), (0.05, 3, -3, 3), (-0.05, 0.05, -3, -0.05), (-0.05, 0.05, 0.05, 3)]
+    corners = np.array([[(x0, y0, 1), (x1, y0, 1), (x1, y1, 1), (x0, y1, 1)] for x0, x1, y0, y1 in hole], float)
+    ceiling = Mesh(corners.reshape(-1, 3), np.concatenate([FACES + 4 * i for i in range(len(hole))]))
+
+    def noise(*lights):
+        """Reported irradiance, and the noise that the job names, %."""
+        job = bake_job(lights, ceiling, settings=replace(SETTINGS, layer=IRRADIANCE), grid=grid)
+        (text,) = [message.text for message in job.run().messages() if message.text.startswith("Direct light")]
+        return float(re.search(r"(\d+) %", text).group(1))
+
+    stored = light_of(grid, np.full((len(STRATA), 2, 2, 3), 1e-3))
+    assert stored.mean_irradiance(grid) == pytest.approx(np.pi * 1e-3, rel=1e-6)
+    assert stored.mean_irradiance(square(8, 2.0)) == 0
+    direct = totals_through(lamp, ceiling, grid)
+    # Each is rounded to 1 %.
+    alone, together = noise(lamp), noise(lamp, stored)
+    assert together == pytest.approx(alone * direct / (direct + np.pi * 1e-3), abs=1.0)
+    assert together < 0.7 * alone
+
+
+def totals_through(lamp, occluders, grid):
+    return float(arrive(grid, Illumination([lamp], occluders), replace(SETTINGS, samples=8))[0].mean())
 
 
 def test_reflectance_of_a_surface():

@@ -104,7 +104,7 @@ def arrive(
 
     def report(irradiance: float, variance: float) -> None:
         if report_noise:
-            report_noise(grid.area, irradiance, variance)
+            report_noise(grid.area, irradiance + illumination.stored_irradiance(grid), variance)
 
     irradiance, flow = native.bake_arrival(
         grid.surface(),

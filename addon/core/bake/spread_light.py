@@ -93,8 +93,9 @@ def _spread_group(
 
     def report_spread(irradiance: float, variance: float) -> None:
         if reports.noise:
-            area = sum(grid.area for grid in grids)
-            reports.noise(area, irradiance, variance / spread_texels(grids[0], material))
+            areas = [grid.area for grid in grids]
+            stored = np.average([spreading.illumination.stored_irradiance(grid) for grid in grids], weights=areas)
+            reports.noise(sum(areas), irradiance + float(stored), variance / spread_texels(grids[0], material))
 
     try:
         return native.bake_luminance(

@@ -168,7 +168,7 @@ BAKE_STEPS = (Simulate(), Solve())
 
 
 def _noisy(name: str, noise: float) -> Message:
-    text = f"The light on '{name}' has a noise of {100 * noise:.0f} %, since few rays find it."
+    text = f"Direct light on '{name}' has {100 * noise:.0f} % of noise, relative to all light there. Few rays find it."
     return note(name, text, "Raise Samples.")
 
 

@@ -10,7 +10,7 @@ import numpy as np
 
 from ..messages import Message, Messages
 from .bent_grid import AnyGrid
-from .lights import Light
+from .lights import FieldLight, Light
 from .occluders import Mesh, Occluder, build
 
 # Distance of the origins that shadows are traced relative to, texels; up to twice as far. Larger values let more
@@ -99,6 +99,10 @@ class Illumination:
     def reaches(self, grids: Sequence[AnyGrid]) -> bool:
         """True if one of the lights can reach one of the grids."""
         return any(not light.is_behind(grid) for light in self.lights for grid in grids)
+
+    def stored_irradiance(self, grid: AnyGrid) -> float:
+        """Mean irradiance of a grid by light that was computed elsewhere, W/m^2."""
+        return sum(light.mean_irradiance(grid) for light in self.lights if isinstance(light, FieldLight))
 
     def arriving_lights(self, grids: Sequence[AnyGrid]) -> list[list[tuple | None]]:
         """All lights at each grid, as those of `native_lights`; None where they can't reach it."""

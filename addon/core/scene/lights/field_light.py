@@ -123,6 +123,15 @@ class FieldLight(Light):
         field = self.field_of(grid)
         return field is None or not field.radiance.any()
 
+    def mean_irradiance(self, grid: AnyGrid) -> float:
+        """Mean over the nodes of a grid and the channels, W/m^2."""
+        field = self.field_of(grid)
+        if field is None:
+            return 0.0
+        weights = WEIGHTS if len(field.radiance) == len(WEIGHTS) else np.ones(1)
+        of_parts = field.radiance.reshape(len(field.radiance), -1, 3).mean(axis=1)
+        return float(np.pi * (weights @ of_parts * self.rgb()).mean())
+
     def at(self, grid):
         field = self.field_of(grid)
         radiance = np.ascontiguousarray(field.radiance, np.float32)
