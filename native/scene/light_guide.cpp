@@ -1,6 +1,7 @@
 #include "scene/light_guide.h"
 
 #include <algorithm>
+#include <cmath>
 #include <limits>
 
 namespace beamspread {
@@ -20,7 +21,7 @@ constexpr double histogram_share = 0.7;
 
 // Number of hits up to which they do not tell how large the opening is. Boxes with these half sides lie around their own.
 constexpr std::size_t few_hits = 5;
-constexpr std::array few_reaches = {1.0 / 2048, 1.0 / 512, 1.0 / 128, 1.0 / 32, 1.0 / 8};
+constexpr std::array few_reaches = {1.0 / 8192, 1.0 / 2048, 1.0 / 512, 1.0 / 128, 1.0 / 32, 1.0 / 8};
 
 // Distance of the box's border to the outermost hits, as a fraction of half its extent, besides the distance at which two
 // hits lie apart on average. Less: rays beyond the border, which count more, make noise.
@@ -34,8 +35,12 @@ constexpr double min_reach = 1.0 / 16384;
 constexpr double beside = 0.5;
 constexpr double floor_of_mean = 0.05;
 
-// Largest fraction of the variance of places that their moves with the position leave; with more they do not move.
-constexpr double max_left_over = 0.2;
+// Moves of places with the position count if they explain the places this many times as well, for each degree of freedom,
+// as chance does (an F-test).
+constexpr double min_evidence = 10.0;
+
+// Distance from their center, in standard deviations of the hits, up to which moves with the position are known.
+constexpr double known_spreads = 2.5;
 
 // Clusters part where the widest gap between hits is more than this fraction of their extent. Less: more clusters.
 constexpr double min_gap = 0.35;
@@ -149,10 +154,18 @@ void HitCluster::fit_steps(std::span<const LightHit> hits)
         return;
     const Vec2 step_x = (yy * by_x - xy * by_y) / determinant;
     const Vec2 step_y = (xx * by_y - xy * by_x) / determinant;
-    if (variance - glm::dot(step_x, by_x) - glm::dot(step_y, by_y) > max_left_over * variance)
+    const double explained = glm::dot(step_x, by_x) + glm::dot(step_y, by_y);
+    const double left_over = std::max(variance - explained, 0.0);
+    if (explained / 2.0 < min_evidence * left_over / static_cast<double>(hits.size() - 3))
         return;
     m_step_x = step_x;
     m_step_y = step_y;
+    m_known = known_spreads * std::sqrt((xx + yy) / static_cast<double>(hits.size()));
+}
+
+double HitCluster::growth(const Vec2& position) const
+{
+    return m_known > 0.0 ? std::max(1.0, glm::length(position - m_center) / m_known) : 1.0;
 }
 
 // Makes the histogram.
@@ -203,16 +216,20 @@ Vec2 HitCluster::place_at(const Vec2& position, const Vec2& square) const
     std::size_t i = 0;
     for (; i + 1 < m_boxes.size() && at >= m_boxes[i].share; ++i)
         at -= m_boxes[i].share;
-    return move + m_boxes[i].low + Vec2(std::min(at / m_boxes[i].share, 1.0), square.y) * m_boxes[i].size;
+    const Box box = m_boxes[i].grown(growth(position));
+    return move + box.low + Vec2(std::min(at / box.share, 1.0), square.y) * box.size;
 }
 
 double HitCluster::density(const Vec2& position, const Vec2& place) const
 {
     const Vec2 still = place - move_to(position);
+    const double larger = growth(position);
     double sum = 0.0;
-    for (const Box& box : m_boxes)
+    for (const Box& small : m_boxes) {
+        const Box box = small.grown(larger);
         if (is_within(glm::fract(still - box.low), box.size))
             sum += box.share / (box.size.x * box.size.y);
+    }
     const Vec2 inside = glm::fract(still - m_histogram.low);
     if (m_histogram.share > 0.0 && is_within(inside, m_histogram.size)) {
         const Vec2 cell =

@@ -36,14 +36,23 @@ private:
     struct Box {
         Vec2 low{}, size{};
         double share = 0.0;
+
+        Box grown(double factor) const
+        {
+            const Vec2 larger = glm::min(factor * size, Vec2(1.0));
+            return {low - 0.5 * (larger - size), larger, share};
+        }
     };
 
     Vec2 move_to(const Vec2& position) const;
+    // How many times as large the larger boxes are at a position: far from the hits their moves are less known.
+    double growth(const Vec2& position) const;
     void fit_steps(std::span<const LightHit> hits);
     void count(std::span<const Vec2> places);
 
     Vec2 m_center{};              // position, texels
     Vec2 m_step_x{}, m_step_y{};  // move of places by a step of a texel
+    double m_known = 0.0;         // distance from the center up to which moves are known, texels; 0: none move
     Box m_histogram;              // of share 0 if hits are too few for it
     std::vector<Box> m_boxes;
     std::array<double, side * side> m_cells{};  // [column][row] density
