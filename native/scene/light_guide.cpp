@@ -21,7 +21,7 @@ constexpr double histogram_share = 0.7;
 
 // Number of hits up to which they do not tell how large the opening is. Boxes with these half sides lie around their own.
 constexpr std::size_t few_hits = 5;
-constexpr std::array few_reaches = {1.0 / 8192, 1.0 / 2048, 1.0 / 512, 1.0 / 128, 1.0 / 32, 1.0 / 8};
+constexpr std::array few_reaches = {1.0 / 2048, 1.0 / 512, 1.0 / 128, 1.0 / 32, 1.0 / 8};
 
 // Distance of the box's border to the outermost hits, as a fraction of half its extent, besides the distance at which two
 // hits lie apart on average. Less: rays beyond the border, which count more, make noise.

@@ -1,7 +1,6 @@
 #include "scene/light_search.h"
 
 #include <algorithm>
-#include <cmath>
 
 #include "base/threads.h"
 
@@ -16,7 +15,7 @@ constexpr std::size_t max_search_rays = 1024;
 
 // Searches of a tile at most, if the last one has found many hits, and if the first pass has. More: guides that fit better,
 // in a longer time.
-constexpr int max_searches = 8;
+constexpr int max_searches = 16;
 constexpr int max_full_searches = 2;
 constexpr int max_lit_searches = 1;
 
@@ -28,9 +27,6 @@ constexpr std::size_t hits_of_neighbor = 16;
 
 // Fraction of rays of the first pass that get through, above which even rays have less noise than guided ones.
 constexpr double max_rare_share = 0.2;
-
-// Distances at which rays start beside a hit: from 2 texels down, each half as far. More: narrower gaps.
-constexpr std::size_t octaves = 7;
 
 // Separates the random numbers of a search from those of other rays.
 constexpr std::uint32_t search_seed = 0x9e3779b9u;
@@ -159,10 +155,9 @@ std::vector<LightHit> LightSearch::search(std::size_t tile, const ProbeLight& pr
     const Vec2 end(static_cast<double>(std::min((x + 1) * tile_side, m_width)),
                    static_cast<double>(std::min((y + 1) * tile_side, m_height)));
     for (std::size_t i = 0; i < m_search_rays; ++i) {
-        // Every other ray starts as near to a hit as the tile allows, at all distances: from farther away a narrow gap may
-        // lie in another direction, and hits beside each other tell how it moves.
-        const double reach = std::exp2(1.0 - static_cast<double>(i / 2 / hits.size() % octaves));
-        const Vec2 beside = Vec2(hits[i / 2 % hits.size()].position) + reach * (2.0 * positions[i] - 1.0);
+        // Every other ray starts as near to a hit as the tile allows: from farther away a narrow gap may lie in another
+        // direction.
+        const Vec2 beside = Vec2(hits[i / 2 % hits.size()].position) + 2.0 * positions[i] - 1.0;
         positions[i] = i % 2 == 1 ? glm::clamp(beside, begin, end) : glm::mix(begin, end, positions[i]);
         densities[i] = guide.guide(positions[i], places[i]);
     }

@@ -104,6 +104,7 @@ def slit(width=0.02):
 
 # Light, exact irradiance; allowed errors of the total and of blocks, and fraction of texels that may find nothing.
 CASES = {
+    "keyhole .04 m": (hole(0.04), 0.02, 0.04, 0.03),
     "hole .06 m": (hole(0.06), 0.01, 0.02, 0.015),
     "hole .1 m": (hole(0.1), 0.01, 0.01, 0.001),
     "hole .25 m": (hole(0.25), 0.005, 0.01, 0.001),
