@@ -7,11 +7,13 @@ import numpy as np
 import pytest
 import scenes
 from beamspread.blender.cycles import cycles_light, process
+from beamspread.blender.node import plain
 from beamspread.blender.node.find import find_node
+from beamspread.blender.node.output import make_plain
 from cycles_truth import cycles_bake, target_material
 from indirect_scenes import GREY, TEXELS, add_scene, add_wall, baked, blocks, irradiance, jobs_of
 from mathutils import Matrix
-from nodes import add_node, set_input
+from nodes import Nodes, add_node, set_input
 
 pytestmark = pytest.mark.usefixtures("few_nodes")
 
@@ -157,3 +159,28 @@ def test_nothing_above_a_receiver_means_no_search():
     assert second.job.finds_light  # the floor is above it
     bpy.context.scene.beamspread.use_indirect = False
     assert not jobs_of(below)[0].job.finds_light
+
+
+@pytest.mark.parametrize("by_cycles", [False, True], ids=["own rays", "Cycles"])
+@pytest.mark.parametrize("kind", [plain.COAT, plain.EMISSION, plain.UNLIT, plain.GROUP])
+def test_a_baked_wall_does_not_shine(by_cycles, kind):
+    """Plain nodes show its image, which is very bright: the floor gets the light of a wall without a bake, within the
+    noise of 1 % that bakes allow."""
+    material = scenes.add_material("Wall", color_mode="BASE_COLOR", base_color=(0.9, 0.6, 0.3), linked=True)
+    floor = add_scene()
+    bpy.data.objects["Wall"].data.materials[0] = material
+    if by_cycles:  # for glass alone, and this is out of the way
+        glass = scenes.add_plane("Glass", (0.1, 0.1), Matrix.Translation((9, 0, 0.5)))
+        nodes = Nodes(bpy.data.materials.new("Glass"), clear=True)
+        glass.data.materials.append(nodes.finish(nodes.add("BsdfGlass")))
+    expected = irradiance(floor, True).mean(axis=(0, 1))
+    assert (expected > 1.01 * irradiance(floor, False).mean(axis=(0, 1)))[0]
+    image = bpy.data.images.new("Baked", 4, 4, float_buffer=True)
+    image.pixels.foreach_set(np.full(64, 50, np.float32))
+    node = scenes.node_of(material)
+    node.image = image
+    if kind == plain.GROUP:
+        make_plain(node)
+    else:
+        plain.make(node, kind)
+    np.testing.assert_allclose(irradiance(floor, True).mean(axis=(0, 1)), expected, rtol=0.01)

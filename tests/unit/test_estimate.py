@@ -6,7 +6,7 @@ from dataclasses import replace
 import pytest
 from beamspread import Medium
 from beamspread.core.bake import steps
-from beamspread.core.bake.estimate import Workload, bounced_seconds, channels_of, simulation_seconds
+from beamspread.core.bake.estimate import Workload, channels_of, simulation_seconds
 from beamspread.core.bake.forecast import Finders, Forecast, seconds_of, steps_of_bakes
 from beamspread.core.bake.pace import Estimate, Pace, pace
 from beamspread.core.bake.spread_light import MIN_RAYS
@@ -83,10 +83,6 @@ def test_each_medium_to_simulate_takes_its_time():
     assert (
         0 < simulation_seconds([first], SETTINGS, is_bent=True) < 0.1 * simulation_seconds([first], FINAL, is_bent=True)
     )
-
-
-def test_more_triangles_make_bounced_light_slower():
-    assert bounced_seconds(100, 1, 0) < bounced_seconds(10**6, 1, 0) < bounced_seconds(10**6, 9, 0)
 
 
 def test_more_threads_are_faster():

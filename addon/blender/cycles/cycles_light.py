@@ -27,6 +27,7 @@ from ...core.bake.estimate import cycles_light_seconds
 from ...core.bake.job import BakeJob, Step
 from ...core.bake.mean_light import mean_irradiance, mean_open_irradiance
 from ...core.bake.smoothing import SPLINE_VARIANCE, smoothing_variance
+from ...core.bake.surroundings import corners_of, enclosed_part
 from ...core.errors import MissingImageError
 from ...core.messages import Message, note, warning
 from ...core.progress import Callback, Progress
@@ -146,6 +147,12 @@ class CyclesLight:
             scene = bpy.data.scenes[self._names[0]]
             self._copy = CopyForCycles(scene, scene.view_layers[self._names[1]])
         return self._copy
+
+    def enclosed_part(self, grid: AnyGrid) -> float:
+        """Part of what a grid sees that objects fill, as the boxes around them."""
+        boxes = self._corners.reshape(-1, 8, 3)
+        normal = None if isinstance(grid, BentGrid) else np.array(grid.normal)
+        return enclosed_part(corners_of(grid), normal, boxes.min(axis=1), boxes.max(axis=1))
 
     def is_below_something(self, grids: Iterable[AnyGrid]) -> bool:
         """True if light may bounce to the receiver: something that renders, or a part of itself, is above it."""

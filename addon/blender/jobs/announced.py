@@ -13,10 +13,11 @@ from ...core.bake.estimate import OF_MESHES, OF_WORLD
 from ...core.bake.forecast import Finders, Forecast, seconds_of
 from ...core.bake.pace import Estimate
 from ...core.bake.spread import Spread
+from ...core.bake.surroundings import Surroundings, enclosed_part
 from ...core.errors import MaterialError
 from ...core.scene.lights import Light, WorldLight
 from ...core.scene.receiver import Grid
-from ...core.target import Target
+from ...core.target import FRONT, Target
 from ...core.time_left import duration
 from .. import compat
 from ..node.draw import bent_materials
@@ -26,6 +27,7 @@ from ..read.lights import lights_surfaces
 from ..read.node_kinds import NodeKinds, all_known, kinds_of
 from ..read.scene_cache import scene_cache
 from ..read.visibility import SURFACE_TYPES, by_name, placed, render_visible_names
+from .rays import traced_around
 from .state import Announced, state
 from .target_shape import Shape, grid_of, grid_of_bent, shape_of
 
@@ -37,11 +39,14 @@ MAX_TARGETS = 200
 # Height above a receiver, relative to its size, from which on an object is above it.
 LOW = 1e-4
 
-# Fraction of a receiver that an object has to reach over for it to be enclosed.
-ENCLOSED = 0.9
-
 # Number of lines about the spread of light in a panel.
 MAX_LINES = 4
+
+# Part of the light of glowing meshes that nothing blocks, about.
+LIT_BY_MESHES = 0.5
+
+# Largest numbers of triangles and of objects among which rays are traced. More keep the window waiting.
+MAX_TRACED, MAX_TRACED_OBJECTS = 300_000, 500
 
 # Shortest simulation that a line names, seconds.
 MIN_SIMULATION = 1.0
@@ -67,7 +72,7 @@ def announce(context, targets: list[Target]) -> dict[Target, Announced]:
         grid = grid_of(bakes[0], shape, _side(bakes[0], shape, scene)) if shape.length else None
         forecast = None if grid is None else facts.forecast(bakes[0], grid, shape)
         if forecast is not None:
-            bake = _announced(target, forecast, settings, facts.encloses(grid))
+            bake = _announced(target, forecast, settings)
             spread = Spread.of(shape.length, forecast.surface, (grid.width, grid.height))
             announced[target] = replace(bake, spread=spread if settings.layer == COMBINED else None)
     return announced
@@ -82,14 +87,14 @@ def compare(target: Target, read: Sequence[Estimate]) -> None:
             state.factors[target, step.kind] = seconds / plain
 
 
-def _announced(target: Target, forecast: Forecast, settings: BakeSettings, is_enclosed: bool) -> Announced:
+def _announced(target: Target, forecast: Forecast, settings: BakeSettings) -> Announced:
     steps, simulations = forecast.steps(settings), forecast.simulations(settings)
     steps = [replace(step, seconds=step.seconds * state.factors.get((target, step.kind), 1.0)) for step in steps]
     if simulations and settings.quality == FINAL and not bpy.app.background:
         quick = replace(settings, quality=PREVIEW, indirect=False)  # the preview of `steps_of`
         steps += forecast.steps(quick)
         simulations |= forecast.simulations(quick)
-    return Announced(tuple(steps), simulations, is_enclosed)
+    return Announced(tuple(steps), simulations)
 
 
 class _SceneFacts:
@@ -98,6 +103,7 @@ class _SceneFacts:
     def __init__(self, scene, view_layer, depsgraph) -> None:
         self.lights: list[Light] = []
         self.triangles, self.lamps_by_cycles, self.is_traceable = 0, 0, True
+        self._depsgraph = depsgraph
         self._boxes: list[tuple] = []
         visible = render_visible_names(view_layer)
         shown = (obj for obj in scene.objects if obj.name in visible)
@@ -140,20 +146,25 @@ class _SceneFacts:
             rows = tuple(map(tuple, np.eye(3).tolist()))
             self.lights.append(WorldLight("World", 1.0, color, True, np.ones((1, 1, 3), np.float32), rows))
 
-    def encloses(self, grid: Grid) -> bool:
-        """True if the box around an object reaches over nearly all of a grid, as a room's does."""
-        low, high = self._extents(grid)
-        size = np.array((grid.width * grid.pitch_x, grid.height * grid.pitch_y))
-        shared = np.minimum(high[:, :2], size / 2) - np.maximum(low[:, :2], -size / 2)
-        covered = np.prod(np.maximum(shared, 0) / size, axis=1)
-        return bool((covered[high[:, 2] > LOW * size.max()] > ENCLOSED).any())
-
     def _is_beside(self, obj) -> bool:
         """True if an object reaches beyond the box around this one."""
         corners = np.array(obj.bound_box) @ np.array(obj.matrix_world)[:3, :3].T + np.array(obj.matrix_world)[:3, 3]
         low, high = corners.min(axis=0), corners.max(axis=0)
         halves, edge = np.abs(self._halves).sum(axis=2), LOW * np.ptp(corners, axis=0).max()
         return bool(((self._centers - halves < low - edge) | (self._centers + halves > high + edge)).any())
+
+    def _around(self, target: BakeTarget, grid: Grid | None) -> Surroundings:
+        """What a target sees, above its grid if it is flat: by rays that Blender traces, or boxes in large scenes."""
+        if self.triangles <= MAX_TRACED and len(self._boxes) <= MAX_TRACED_OBJECTS:
+            side = 1.0 if target.side == FRONT else -1.0
+            around = traced_around(self._depsgraph, target.obj, side, self.lights)
+            unread = max(self.world_by_cycles * (1 - around.enclosed), LIT_BY_MESHES * self._glowing)
+            return replace(around, lit=max(around.lit, unread))
+        obj = target.obj
+        own = np.array(obj.bound_box) @ np.array(obj.matrix_world)[:3, :3].T + np.array(obj.matrix_world)[:3, 3]
+        normal = None if grid is None else np.array(grid.normal)
+        halves = np.abs(self._halves).sum(axis=2)
+        return Surroundings(enclosed_part(own, normal, self._centers - halves, self._centers + halves))
 
     def _extents(self, grid: Grid) -> tuple[np.ndarray, np.ndarray]:
         """Lowest and highest coordinates (N, 3) of all boxes in a grid's frame, from its center."""
@@ -174,12 +185,14 @@ class _SceneFacts:
             reach = max(high[:, 2].max(), -low[:, 2].min() * (surface.thickness > 0))
             is_below = reach > LOW * max(obj.dimensions)
         is_textured = target.node.has_texture()
+        is_own = self.is_traceable and not self.lamps_by_cycles
         finders = Finders(
             bounced=is_below,
-            is_own=self.is_traceable and not self.lamps_by_cycles,
+            is_own=is_own,
             world=self.world_by_cycles,
             lamps=self.lamps_by_cycles,
             colors=is_textured and not all_known(target.node.color_input(target.groups)),
+            around=self._around(target, None if shape.is_bent else grid) if is_below and is_own else Surroundings(),
         )
         surface = replace(surface, base_color=PLACEHOLDER_COLOR) if is_textured else surface
         rest = finders, self.unknown, shape.is_bent, shape.pieces
@@ -211,8 +224,7 @@ def line_of(announced: dict[Target, Announced], targets: Iterable[Target]) -> st
     chosen = [announced.get(target) for target in targets]
     if not chosen or None in chosen:
         return ""
-    about = "At least" if any(bake.is_rough() for bake in chosen) else "About"
-    return f"{about} {duration(_total(chosen))}"
+    return f"About {duration(_total(chosen))}"
 
 
 def seconds_of_frames(announced: dict[Target, Announced], targets: Iterable[Target], count: int) -> float | None:

@@ -10,7 +10,6 @@ from enum import Enum
 
 from bpy.app.handlers import persistent
 
-from ...core.bake.bounced import BouncedLight
 from ...core.bake.pace import Estimate, pace
 from ...core.bake.runner import CANCELLED, WRITTEN, Bake
 from ...core.bake.spread import Spread
@@ -53,19 +52,12 @@ class Announced:
     ----------
     steps : estimates of its steps.
     simulations : estimates of the simulations that it needs first, by medium and quality: bakes share them.
-    is_enclosed : True if an object reaches over all of the receiver, so that bounced light may take much longer.
     spread : how far light spreads in the image; None if the result is not luminance.
     """
 
     steps: tuple[Estimate, ...]
     simulations: dict[object, Estimate]
-    is_enclosed: bool = False
     spread: Spread | None = None
-
-    def is_rough(self) -> bool:
-        """True if the bake may take much longer."""
-        bounced = (step for step in self.steps if step.kind == BouncedLight.name)
-        return self.is_enclosed and not all(step.is_measured() for step in bounced)
 
 
 @dataclass(frozen=True)

@@ -14,11 +14,11 @@ from ..progress import Progress
 from ..scene.bent_grid import AnyGrid, BentGrid
 from ..scene.grid import Grid
 from ..scene.lights import STRATA, BentField, Field, FieldLight
-from .estimate import bounced_seconds
 from .job import BakeJob, Step
 from .layers import WITHOUT_MEDIUM
 from .mean_light import mean_irradiance, mean_open_irradiance
 from .smoothing import SPLINE_VARIANCE, smoothing_variance
+from .surroundings import bounced_seconds, surroundings_of
 
 # Nodes along the longest side of a receiver, and the root of their number on a mesh that bends; more resolve bounced
 # light more finely and take longer.
@@ -65,9 +65,9 @@ class BouncedLight(Step):
     finds_light = True
 
     def seconds(self, job: BakeJob) -> float:
-        sides = len(job.lit_grids) // len(job.grids)
-        lights = len(job.illumination.lights)
-        return sides * bounced_seconds(job.illumination.triangle_count, lights, job.settings.threads)
+        around = surroundings_of(job.grids, job.illumination, any(step.finds_world for step in job.steps))
+        triangles, nodes = job.illumination.triangle_count, node_count(job.lit_grids, self.nodes)
+        return bounced_seconds(triangles, around, nodes, job.receiver.is_bent, job.settings.threads, self.max_rays)
 
     def run(self, job: BakeJob, progress: Progress) -> BakeJob:
         receiver, illumination, settings = job.receiver, job.illumination, job.settings
@@ -138,8 +138,7 @@ def bent_nodes_of(grids: Sequence[BentGrid], nodes: int) -> list:
 
 def charts_of(grids: Sequence[Grid], nodes: int) -> list[dict]:
     """Rectangles of nodes slightly above grids, `nodes` along the longest side, for the native tracer."""
-    sizes = [(grid.width * grid.pitch_x, grid.height * grid.pitch_y) for grid in grids]
-    cell = max(*map(max, sizes), math.sqrt(sum(x * y for x, y in sizes) / MAX_SQUARES)) / nodes
+    sizes, cell = _sizes_and_cell(grids, nodes)
     charts = []
     for grid, size in zip(grids, sizes):
         lift = grid.clearance + LIFT * cell + 1e-6 * float(np.abs(grid.origin).max())
@@ -154,3 +153,17 @@ def charts_of(grids: Sequence[Grid], nodes: int) -> list[dict]:
             }
         )
     return charts
+
+
+def node_count(grids: Sequence[AnyGrid], nodes: int = NODES) -> float:
+    """Number of nodes of grids, about; `nodes` as in `bent_nodes_of` and `charts_of`."""
+    if any(isinstance(grid, BentGrid) for grid in grids):
+        return len(grids) * nodes**2
+    sizes, cell = _sizes_and_cell(grids, nodes)
+    return sum(max(x / cell, 1.0) * max(y / cell, 1.0) for x, y in sizes)
+
+
+def _sizes_and_cell(grids: Sequence[Grid], nodes: int) -> tuple[list[tuple[float, float]], float]:
+    """Sides of grids, and the distance of their nodes, scene units."""
+    sizes = [(grid.width * grid.pitch_x, grid.height * grid.pitch_y) for grid in grids]
+    return sizes, max(*map(max, sizes), math.sqrt(sum(x * y for x, y in sizes) / MAX_SQUARES)) / nodes

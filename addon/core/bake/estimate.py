@@ -64,9 +64,6 @@ HALF_SPACE_ANGLE, SLAB_ANGLE, SLAB_THICKNESS = 6.0, 0.9, 5.0
 # Seconds of the simulation of a photon on a curved surface, for each transport mean free path in mean free paths.
 CURVED_PHOTON = 0.2e-6
 
-# Seconds of bounced light by rays of our own: in any case, for each doubling of the triangles, and for that and each
-# light.
-BOUNCED, BOUNCED_TRIANGLES, BOUNCED_LIGHTS = 0.1, 0.02, 0.012
 # Seconds of the solution for bounced light: in any case, and per texel.
 SPREAD_BOUNCED, SPREAD_BOUNCED_TEXEL = 0.15, 0.65e-6
 
@@ -175,8 +172,8 @@ class Workload:
         tracing = self.texels * (self._rays_of_lamps(settings) + self._rays_of_sizes())
         fixed = ANY_BAKE + ANY_PLANE * self.planes
         if settings.layer in WITHOUT_MEDIUM:
-            return fixed + _parallel(tracing, settings.threads)
-        return fixed + _parallel(tracing + self._spreading(settings), settings.threads)
+            return fixed + parallel_seconds(tracing, settings.threads)
+        return fixed + parallel_seconds(tracing + self._spreading(settings), settings.threads)
 
     def _rays_of_lamps(self, settings: BakeSettings) -> float:
         doublings = max(math.log2(max(self.triangles, 1) / MANY_TRIANGLES), 0.0)
@@ -252,7 +249,7 @@ def _rays(
 
 def simulation_seconds(media: Sequence, settings: BakeSettings, is_bent: bool = False) -> float:
     """Seconds in which media are simulated, for surfaces that bend also on curves."""
-    return sum(_parallel(_simulation(medium, settings.quality, is_bent), settings.threads) for medium in media)
+    return sum(parallel_seconds(_simulation(medium, settings.quality, is_bent), settings.threads) for medium in media)
 
 
 def _simulation(medium, quality: str, is_bent: bool) -> float:
@@ -265,27 +262,22 @@ def _simulation(medium, quality: str, is_bent: bool) -> float:
     return plane * (not is_known(medium, quality)) + photon * beams * curved_photons_for(medium, quality)
 
 
-def _parallel(seconds: float, threads: int) -> float:
+def parallel_seconds(seconds: float, threads: int) -> float:
     """Seconds of work that takes one thread this long; `threads`: 0 for all."""
     return seconds / (threads or os.cpu_count() or 1) ** THREADS_POWER
 
 
-def bounced_seconds(triangles: int, lights: int, threads: int) -> float:
-    """Seconds in which our own rays find bounced light."""
-    return _parallel(BOUNCED + (BOUNCED_TRIANGLES + BOUNCED_LIGHTS * lights) * math.log2(1 + triangles), threads)
-
-
 def textured_seconds(texels: int, threads: int) -> float:
     """Seconds in which light is found in the albedos of texels."""
-    return _parallel(TEXTURED * texels, threads)
+    return parallel_seconds(TEXTURED * texels, threads)
 
 
 def cycles_light_seconds(world: bool, lamps: int, bounced: bool, triangles: int) -> float:
     """Seconds in which Cycles renders the world, finds light of lamps, and bounced light."""
     lights = CYCLES_WORLD * world + CYCLES_LAMP * lamps + CYCLES_BOUNCED * bounced
-    return CYCLES_START + _parallel(lights, 0) + CYCLES_TRIANGLE * triangles
+    return CYCLES_START + parallel_seconds(lights, 0) + CYCLES_TRIANGLE * triangles
 
 
 def cycles_color_seconds(texels: int) -> float:
     """Seconds in which Cycles evaluates a base color."""
-    return CYCLES_START + _parallel(CYCLES_COLOR * texels, 0)
+    return CYCLES_START + parallel_seconds(CYCLES_COLOR * texels, 0)

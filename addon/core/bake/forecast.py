@@ -9,12 +9,11 @@ from ..ldf.library import SIMULATING
 from ..scene.bent_grid import AnyGrid
 from ..scene.lights import Light
 from .bake_settings import BakeSettings
-from .bounced import BouncedLight
+from .bounced import MAX_RAYS, NODES, BouncedLight, node_count
 from .estimate import (
     CYCLES_COLORS,
     CYCLES_LIGHT,
     OF_WORLD,
-    bounced_seconds,
     cycles_color_seconds,
     cycles_light_seconds,
     simulation_seconds,
@@ -24,6 +23,7 @@ from .pace import Estimate
 from .spread_light import has_back
 from .steps import Solve, needs_medium, to_simulate
 from .surface import Surface
+from .surroundings import OPEN, Surroundings, bounced_seconds
 
 
 @dataclass(frozen=True)
@@ -37,6 +37,7 @@ class Finders:
     world : True if Cycles renders the world.
     lamps : number of lamps whose light Cycles finds.
     colors : True if Cycles evaluates the base color.
+    around : what the receiver sees, which decides how long our own rays take.
     """
 
     bounced: bool = False
@@ -44,6 +45,7 @@ class Finders:
     world: bool = False
     lamps: int = 0
     colors: bool = False
+    around: Surroundings = OPEN
 
 
 @dataclass(frozen=True, eq=False)
@@ -83,7 +85,9 @@ class Forecast:
             steps.append((CYCLES_LIGHT, cycles_light_seconds(*lights, self.triangles)))
         if bounced and finders.is_own:
             sides = 1 + has_back(self.surface.thickness, settings)
-            steps.append((BouncedLight.name, sides * bounced_seconds(self.triangles, len(self.lights), threads)))
+            nodes = sides * (NODES**2 if self.is_bent else node_count(self.grids))
+            seconds = bounced_seconds(self.triangles, finders.around, nodes, self.is_bent, threads, MAX_RAYS)
+            steps.append((BouncedLight.name, seconds))
         unknown = max(self.unknown, OF_WORLD * finders.world)
         loads = workloads_of(self.grids, self.lights, self.triangles, self.surface, settings, bounced, unknown)
         known = {"is_bent": self.is_bent, **({"pieces": self.pieces} if self.pieces else {})}

@@ -23,9 +23,9 @@ def mean_open_irradiance(grid: AnyGrid, lights: Sequence[Light], texels: int = O
     return _mean_irradiance(grid, Illumination(lights), texels, OPEN_RAYS)
 
 
-def mean_irradiance(grid: AnyGrid, illumination: Illumination) -> float:
-    """Mean irradiance with shadows, W/m^2."""
-    return _mean_irradiance(grid, illumination, SHADOW_TEXELS, SHADOW_RAYS)
+def mean_irradiance(grid: AnyGrid, illumination: Illumination, texels: int = SHADOW_TEXELS) -> float:
+    """Mean irradiance with shadows, W/m^2, by so many texels along a side."""
+    return _mean_irradiance(grid, illumination, texels, SHADOW_RAYS)
 
 
 def _mean_irradiance(grid: AnyGrid, illumination: Illumination, texels: int, rays: int) -> float:

@@ -20,8 +20,10 @@ from ....core.bake.spread import Spread, length_of, mean_size
 from ....core.bake.spread_light import backs_of
 from ....core.bake.steps import BAKE_STEPS, needs_medium, to_simulate
 from ....core.bake.surface import Surface
+from ....core.bake.surroundings import Surroundings, surroundings_of
 from ....core.errors import BakeError
 from ....core.native import native
+from ....core.scene.bent_grid import AnyGrid
 from ....core.scene.flat_mesh import FlatMesh
 from ....core.scene.illumination import Illumination
 from ....core.scene.receiver import build_receiver, outline
@@ -41,6 +43,9 @@ from .receiving import Receiving, read_receiver, sized
 
 PLACEHOLDER_COLOR = (0.5, 0.5, 0.5)
 """Base color until Cycles has evaluated it."""
+
+MAX_TRACED = 1_000_000
+"""Number of triangles up to which estimates trace rays among them; more keep the window waiting when a bake begins."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -89,15 +94,23 @@ class BakePlan:
         grids = [grid if self.target.side == FRONT else grid.flipped() for grid in grids]
         sides = [*grids, *(backs_of(grids) if self.surface.thickness > 0 else [])]
         bounced = bool(light.lights or light.by_cycles) and self.by_cycles.is_below_something(sides)
+        is_own = not (lamps or light.untraceable)
         finders = Finders(
             bounced=bounced,
-            is_own=not (lamps or light.untraceable),
+            is_own=is_own,
             world=len(light.by_cycles) > lamps,
             lamps=lamps,
             colors=self.color is not None and bool(self.color.unknown),
+            around=self._around(grids, light, len(light.by_cycles) > lamps) if bounced and is_own else Surroundings(),
         )
         facts = light.lights, light.triangle_count, self.surface_with_color(), finders
         return Forecast(name, grids, *facts, is_bent=self.mesh.is_bent)
+
+    def _around(self, grids: list[AnyGrid], light: Illumination, has_unknown_sky: bool) -> Surroundings:
+        """What the receiver sees; by boxes around objects where it would take long to trace them here."""
+        if light.triangle_count <= MAX_TRACED:
+            return surroundings_of(grids, light, has_unknown_sky)
+        return Surroundings(max(map(self.by_cycles.enclosed_part, grids)))
 
     def bake(self, settings: BakeSettings) -> Bake:
         """The bake, with its job or the error; call it in the main thread."""
