@@ -18,6 +18,9 @@ NARROW = 2.0
 RANGE = 0.05
 """Fraction of the light that may lie beyond the outermost directions of paths. Larger: nearer to most of the light."""
 
+STEP = 20.0
+"""Degrees between angles from the normal where there may be more than two. Larger: fewer paths, as above."""
+
 MAX_OWN = 3
 """Largest number of lights with a direction of their own. More: longer; fewer: suns that share directions."""
 
@@ -37,7 +40,7 @@ class DirectionClasses:
 
     Attributes
     ----------
-    angles : from the normal, degrees, ascending: one or two.
+    angles : from the normal, degrees, ascending: one or more.
     azimuths : degrees, ascending.
     is_whole : True if the azimuths go around.
     """
@@ -47,11 +50,11 @@ class DirectionClasses:
     is_whole: bool
 
     @classmethod
-    def of(cls, powers: Sequence[NDArray], ways: Sequence[NDArray]) -> DirectionClasses:
+    def of(cls, powers: Sequence[NDArray], ways: Sequence[NDArray], max_angles: int = 2) -> DirectionClasses:
         """Classes between which nearly all of the light lies, whose power (N,) and directions (N, 3) are given."""
         power, way = np.concatenate(powers), np.concatenate(ways)
         angle, azimuth = _angles(way)
-        angles = _nodes(angle, power)
+        angles = _nodes(angle, power, max_angles)
         if angles[-1] < STEEP:
             return cls(angles, (0.0,), False)
         return cls(angles, *_azimuth_nodes(azimuth, power * np.sin(np.radians(angle))))
@@ -123,7 +126,13 @@ class Splitter:
         self._beams: dict[object, tuple[NDArray, NDArray]] = {}
 
     @classmethod
-    def of(cls, surveys: Sequence[tuple[NDArray, NDArray]], max_own: int = MAX_OWN, is_split: bool = True) -> Splitter:
+    def of(
+        cls,
+        surveys: Sequence[tuple[NDArray, NDArray]],
+        max_own: int = MAX_OWN,
+        is_split: bool = True,
+        max_angles: int = 2,
+    ) -> Splitter:
         """From powers (...) and directions (..., 3) of each light; not `is_split`: others have their mean one."""
         directions = [direction_of(*survey) for survey in surveys]
         narrow = [number for number, way in enumerate(directions) if way is not None]
@@ -133,7 +142,8 @@ class Splitter:
         if not rest:
             return cls(own, None)
         powers, ways = [power.ravel() for power, _ in rest], [way.reshape(-1, 3) for _, way in rest]
-        return cls(own, DirectionClasses.of(powers, ways) if is_split else DirectionClasses.mean(powers, ways))
+        classes = DirectionClasses.of(powers, ways, max_angles) if is_split else DirectionClasses.mean(powers, ways)
+        return cls(own, classes)
 
     @property
     def beams(self) -> Beams:
@@ -161,10 +171,13 @@ def _angles(way: NDArray) -> tuple[NDArray, NDArray]:
     return angle, np.degrees(np.arctan2(way[..., 1], way[..., 0]))
 
 
-def _nodes(values: NDArray, weights: NDArray) -> tuple[float, ...]:
-    """One or two values between which nearly all of the weight lies."""
+def _nodes(values: NDArray, weights: NDArray, most: int) -> tuple[float, ...]:
+    """One value, or some from the least to the largest between which nearly all of the weight lies."""
     low, high = _quantiles(values, weights)
-    return ((low + high) / 2,) if high - low < NARROW else (low, high)
+    if high - low < NARROW:
+        return ((low + high) / 2,)
+    count = min(max(round((high - low) / STEP) + 1, 2), most)
+    return tuple(np.linspace(low, high, count).tolist())
 
 
 def _quantiles(values: NDArray, weights: NDArray) -> tuple[float, float]:

@@ -57,6 +57,8 @@ LIT_BY_LAMPS = 0.5
 
 # Seconds per texel of light in a texture's albedos; lamps take three times as long as a sun, which this is between.
 TEXTURED = 4e-6
+# The same on surfaces that bend, in any case, and by the root of the number of texels.
+BENT_TEXTURED, BENT_TEXTURED_ROOT = 2.5, 0.033
 
 # Seconds of the simulation of an angle in final quality, in half-spaces; and in slabs up to a thickness in mean free
 # paths, with whose root it grows beyond.
@@ -267,8 +269,10 @@ def parallel_seconds(seconds: float, threads: int) -> float:
     return seconds / (threads or os.cpu_count() or 1) ** THREADS_POWER
 
 
-def textured_seconds(texels: int, threads: int) -> float:
+def textured_seconds(texels: int, threads: int, is_bent: bool = False) -> float:
     """Seconds in which light is found in the albedos of texels."""
+    if is_bent and texels:
+        return parallel_seconds(BENT_TEXTURED + BENT_TEXTURED_ROOT * math.sqrt(texels), threads)
     return parallel_seconds(TEXTURED * texels, threads)
 
 

@@ -118,7 +118,7 @@ class BakeJob:
         """The job with a base color and its messages: the surface has its mean, the receiver the rest."""
         illumination, receiver = self.illumination.with_messages(*color.warnings), self.receiver
         if color.texture is not None and color.texture.use.is_scattered:
-            why = why_multiplied(receiver, self.settings)
+            why = why_multiplied(self.settings)
             if why:
                 color = replace(color, texture=self.surface.multiplied(color.texture))
                 illumination = illumination.with_messages(multiplied_note(self.name, why))

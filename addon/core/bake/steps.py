@@ -44,6 +44,9 @@ TEXTURED_BYTES = 60e6, 200
 BENT_BYTES = 400e6, 2500
 """The same of surfaces that bend, per texel that shows them."""
 
+BENT_TEXTURED_BYTES, MOST_TEXTURED_BYTES = 8500, 900e6
+"""Bytes per texel of textures on these, and most bytes."""
+
 PASS_BYTES = 50e6, 120
 """The same of irradiance and direction, without a medium."""
 
@@ -102,7 +105,7 @@ class Solve(Step):
     name = "Baking"
 
     def seconds(self, job: BakeJob) -> float:
-        textured = textured_seconds(textured_texels(job), job.settings.threads)
+        textured = textured_seconds(textured_texels(job), job.settings.threads, job.receiver.is_bent)
         return textured + sum(load.seconds(job.settings) for load in job.workloads())
 
     def kind(self, job: BakeJob) -> str:
@@ -148,7 +151,9 @@ class Solve(Step):
             return pass_bytes(texels)
         if job.receiver.is_bent:
             fixed, per_texel = BENT_BYTES
-            return fixed + per_texel * job.receiver.charts[0].grid.texels
+            # Paths through a texture follow the solver, after which they have its memory.
+            least = min(BENT_TEXTURED_BYTES * textured_texels(job), MOST_TEXTURED_BYTES)
+            return fixed + max(per_texel * job.receiver.charts[0].grid.texels, least)
         mirrored, _ = with_edges([chart.grid for chart in job.receiver.charts], surface, job.name)
         texels = max(texels, *map(texels_with_images, mirrored))
         is_narrow = not job.finds_light and all(light.has_one_direction for light in lights)

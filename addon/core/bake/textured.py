@@ -89,6 +89,23 @@ def checked_map(albedo: ArrayLike, shape: tuple[int, ...]) -> NDArray[np.float32
     return np.ascontiguousarray(np.broadcast_to(values if values.ndim == 3 else values[..., None], shape), np.float32)
 
 
+def continued(values: NDArray, known: NDArray) -> NDArray:
+    """Values (H, W) or (H, W, C) that go on beyond the known texels (H, W) by means of those nearby."""
+    if known.all() or not known.any():
+        return values
+    height, width = known.shape
+    even = [(0, height % 2), (0, width % 2)] + [(0, 0)] * (values.ndim - 2)
+    is_known = known.reshape(*known.shape, *[1] * (values.ndim - 2))
+    weights, sums = (np.pad(array, even) for array in (np.float32(is_known), np.float32(np.where(is_known, values, 0))))
+    weights, sums = (
+        array.reshape(len(array) // 2, 2, array.shape[1] // 2, 2, *array.shape[2:]).sum(axis=(1, 3))
+        for array in (weights, sums)
+    )
+    coarse = np.divide(sums, weights, out=np.zeros_like(sums), where=weights > 0)
+    coarse = continued(coarse, weights.reshape(*weights.shape[:2], -1)[..., 0] > 0)
+    return np.where(is_known, values, coarse.repeat(2, axis=0).repeat(2, axis=1)[:height, :width])
+
+
 @dataclass(frozen=True, eq=False)
 class Convention:
     """The usual convention for one channel: one albedo, and a factor for light that enters and for light that leaves.

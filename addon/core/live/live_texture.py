@@ -22,7 +22,7 @@ def textured(target: LiveTarget, receiver: Receiver, material: Material, sources
     texture = target.texture
     if not is_scattered(target):
         return texture.on(receiver)
-    if why_multiplied(receiver, target.settings):
+    if why_multiplied(target.settings):
         return target.surface.multiplied(texture).on(receiver)
     receiver = texture.on(receiver)
     grids, _ = with_factors([chart.grid for chart in receiver.charts], material, sources)
@@ -30,7 +30,7 @@ def textured(target: LiveTarget, receiver: Receiver, material: Material, sources
     return replace(receiver, charts=charts)
 
 
-def texture_notes(target: LiveTarget, receiver: Receiver) -> tuple[Message, ...]:
+def texture_notes(target: LiveTarget) -> tuple[Message, ...]:
     """Notes about a texture that can't scatter light."""
-    why = why_multiplied(receiver, target.settings) if is_scattered(target) else ""
+    why = why_multiplied(target.settings) if is_scattered(target) else ""
     return (multiplied_note(target.target.object_name, why),) if why else ()

@@ -160,7 +160,7 @@ class LiveRenderer:
         news = [message for message in illumination.messages if message not in target.illumination.messages]
         if max(noises) > NOISY * FINAL_EFFORT.noise:
             news.append(noisy_note(name, max(noises)))
-        notes = texture_notes(target, framed.receiver)
+        notes = texture_notes(target)
         messages = (*self._mesh(target).messages, *edges, *limits, *notes, *news)
         return Rendering(target.target, texture, framed, is_exact=True, messages=messages)
 
@@ -242,7 +242,7 @@ class LiveRenderer:
         if whole.color_out is not None:
             # At all texels, so that the texture keeps its detail.
             resized_texture = resized_texture * whole.color_out
-        messages = *self._mesh(target).messages, *texture_notes(target, whole.receiver)
+        messages = *self._mesh(target).messages, *texture_notes(target)
         return Rendering(target.target, resized_texture, whole, messages=messages)
 
     def _quick_luminance(self, grid: Grid, spreading: Spreading, progress) -> np.ndarray:
