@@ -267,6 +267,38 @@ def test_quick_renderings_show_how_light_scatters_in_a_texture(renderer):
     assert np.abs(quick.texture - exact.texture).mean() < 0.5 * np.abs(other.texture - exact.texture).mean()
 
 
+def arch(faces=16, radius=0.4):
+    """Half of an open cylinder around the y axis."""
+    turn = np.linspace(-np.pi / 2, np.pi / 2, faces + 1)
+    at = np.stack([radius * np.sin(turn), 0 * turn, radius * np.cos(turn)], -1)
+    corners, uvs = [], []
+    for i in range(faces):
+        corners += [at[i] - (0, 0.5, 0), at[i + 1] - (0, 0.5, 0), at[i + 1] + (0, 0.5, 0), at[i] + (0, 0.5, 0)]
+        uvs += [(i / faces, 0), ((i + 1) / faces, 0), ((i + 1) / faces, 1), (i / faces, 1)]
+    middles = (turn[1:] + turn[:-1]) / 2
+    normals = np.stack([np.sin(middles), 0 * middles, np.cos(middles)], -1)
+    return Polygons(np.array(corners), np.array(uvs, float), np.arange(0, 4 * faces + 1, 4), normals)
+
+
+def test_textures_of_meshes_that_bend_scatter_light_in_live_as_in_bakes(renderer):
+    """Exact renderings have the texels of a bake, quick ones half of the convention's error at most."""
+    plain = live_target(SUN, size=48)
+    plain = replace(plain, polygons=arch(), spread=0.2)
+    receiver = build_receiver(flatten(plain.polygons, spread=plain.spread), 48, 48)
+    assert receiver.is_bent
+    shape = receiver.charts[0].grid.areas.shape
+    colors = np.where(np.arange(shape[1]) // 6 % 2, 0.9, 0.4)[None, :, None] * np.ones((*shape, 3))
+    texture = Texture(receiver, (colors.astype(np.float32),), TextureUse())
+    surface = plain.surface.colored(BaseColor(texture))
+    scattered = replace(plain, texture=texture, surface=surface)
+    multiplied = replace(scattered, texture=surface.multiplied(texture))
+    quick, exact, other = renderer.quick(scattered, 48), renderer.exact(scattered), renderer.exact(multiplied)
+    job = BakeJob("Floor", texture.on(receiver), scattered.illumination, surface, scattered.settings, BAKE_STEPS)
+    np.testing.assert_allclose(exact.texture, job.run().texture, rtol=1e-4, atol=1e-6)
+    assert not any("multiplies" in str(message) for message in exact.messages)
+    assert np.abs(quick.texture - exact.texture).mean() < 0.5 * np.abs(other.texture - exact.texture).mean()
+
+
 @pytest.mark.parametrize("lights", [[LAMP], [AREA]], ids=["lamp", "area"])
 def test_quick_renderings_of_many_planes_are_nearly_bakes(lights, renderer):
     """Planes of twelve sizes are solved together. Most of the error: bakes alone finish texels that edges cut."""
