@@ -38,6 +38,9 @@ MAX_ROW = 1 << 16
 MAX_TEXELS = 1 << 20
 """Most texels of all planes together; if there are more, they become larger. Larger: more memory."""
 
+ONE_AZIMUTH = 90.0
+"""Degrees within which azimuths count as one: planes turn with the light. Larger: less noise, and light that turns."""
+
 MIN_GAP, MAX_GAP = 2, 8
 """Texels between points of a surface that stretched texels show. More: gaps in surfaces are lit."""
 
@@ -154,7 +157,8 @@ class PointsLight:
         for number, middle in enumerate(middles):
             turns[nearest == number] = middle.turns(self._survey.at(nearest == number))
         surveys = [(power, _turned(way, np.tile(turns, len(power) // len(turns)))) for power, way in self._surveys]
-        splitter = Splitter.of(surveys, self._effort.max_own, self._effort.is_split, MAX_ANGLES)
+        effort = self._effort
+        splitter = Splitter.of(surveys, effort.max_own, effort.is_split, MAX_ANGLES, ONE_AZIMUTH)
         for number, light in enumerate(self._lights.lights):
             for part, way in rays_of(self._target, light, self._lights, self._settings, self._effort):
                 power, ways = (values.reshape(-1, 3)[image.points] for values in (part, way))

@@ -50,14 +50,21 @@ class DirectionClasses:
     is_whole: bool
 
     @classmethod
-    def of(cls, powers: Sequence[NDArray], ways: Sequence[NDArray], max_angles: int = 2) -> DirectionClasses:
-        """Classes between which nearly all of the light lies, whose power (N,) and directions (N, 3) are given."""
+    def of(
+        cls, powers: Sequence[NDArray], ways: Sequence[NDArray], max_angles: int = 2, one_azimuth: float = NARROW
+    ) -> DirectionClasses:
+        """Classes between which nearly all of the light lies, whose power (N,) and directions (N, 3) are given.
+
+        Parameters
+        ----------
+        one_azimuth : azimuths within this many degrees count as one.
+        """
         power, way = np.concatenate(powers), np.concatenate(ways)
         angle, azimuth = _angles(way)
         angles = _nodes(angle, power, max_angles)
         if angles[-1] < STEEP:
             return cls(angles, (0.0,), False)
-        return cls(angles, *_azimuth_nodes(azimuth, power * np.sin(np.radians(angle))))
+        return cls(angles, *_azimuth_nodes(azimuth, power * np.sin(np.radians(angle)), one_azimuth))
 
     @classmethod
     def mean(cls, powers: Sequence[NDArray], ways: Sequence[NDArray]) -> DirectionClasses:
@@ -132,8 +139,12 @@ class Splitter:
         max_own: int = MAX_OWN,
         is_split: bool = True,
         max_angles: int = 2,
+        one_azimuth: float = NARROW,
     ) -> Splitter:
-        """From powers (...) and directions (..., 3) of each light; not `is_split`: others have their mean one."""
+        """From powers (...) and directions (..., 3) of each light; not `is_split`: others have their mean one.
+
+        `max_angles`, `one_azimuth`: as for `DirectionClasses.of`.
+        """
         directions = [direction_of(*survey) for survey in surveys]
         narrow = [number for number, way in enumerate(directions) if way is not None]
         narrow.sort(key=lambda number: -float(surveys[number][0].sum()))
@@ -142,8 +153,9 @@ class Splitter:
         if not rest:
             return cls(own, None)
         powers, ways = [power.ravel() for power, _ in rest], [way.reshape(-1, 3) for _, way in rest]
-        classes = DirectionClasses.of(powers, ways, max_angles) if is_split else DirectionClasses.mean(powers, ways)
-        return cls(own, classes)
+        if not is_split:
+            return cls(own, DirectionClasses.mean(powers, ways))
+        return cls(own, DirectionClasses.of(powers, ways, max_angles, one_azimuth))
 
     @property
     def beams(self) -> Beams:
@@ -190,12 +202,12 @@ def _quantiles(values: NDArray, weights: NDArray) -> tuple[float, float]:
     return float(low), float(high)
 
 
-def _azimuth_nodes(values: NDArray, weights: NDArray) -> tuple[tuple[float, ...], bool]:
+def _azimuth_nodes(values: NDArray, weights: NDArray, one_azimuth: float) -> tuple[tuple[float, ...], bool]:
     """Azimuths, degrees, ascending; True if they go around."""
     turns = np.exp(1j * np.radians(values))
     middle = round(float(np.degrees(np.angle((weights * turns).sum()))), 2)  # see `DIGITS`
     low, high = _quantiles((values - middle + 180) % 360 - 180, weights)
-    if high - low < NARROW:
+    if high - low < one_azimuth:
         return (middle + (low + high) / 2,), False
     if high - low <= 180:
         return (middle + low, middle + (low + high) / 2, middle + high), False
