@@ -8,6 +8,7 @@ from beamspread.blender.jobs.state import state
 from beamspread.core.ldf.reflectance_table import reflectance_table
 from beamspread.core.material import Material
 from scenes import add_material, add_mesh, add_plane, add_sun, bake, node_of
+from test_udim import read, tile_file, tiled_image
 
 SIZE, SIDE, ANGLE = 48, 2.0, 30
 PATH = SIDE / SIZE
@@ -170,3 +171,31 @@ def test_light_scatters_in_textures_of_meshes_that_bend():
         truths.append(luminance(-way[..., 2], way, medium, PATH, albedo=albedo))
     assert nearest(found, truths) < 0.05
     assert not any("multiplies light" in line or "baked as flat" in line for line in state.lines())
+
+
+def test_a_mesh_that_bends_has_its_texture_in_tiles(tmp_path):
+    """Two UDIM tiles, whose colors are the same since the image repeats, are as one image twice as wide."""
+    scene = bpy.context.scene.beamspread
+    scene.margin, scene.image_dir, scene.use_indirect = 0, str(tmp_path), False
+    add_sun(ANGLE)
+    medium = {"color_mode": "BASE_COLOR", "mean_free_path": (PATH,) * 3, "anisotropy": G, "ior": IOR}
+    half, colors = SIZE // 2, stripes(*COLORS, period=8)[: SIZE // 2, : SIZE // 2]
+    found = {}
+    for name, image, wide in (
+        ("Tiles", tiled_image(tmp_path, {1001: (half, half), 1002: (half, half)}), colors),
+        ("Whole", bpy.data.images.new("Whole", SIZE, half, float_buffer=True), np.tile(colors, (1, 2, 1))),
+    ):
+        state.forget()
+        obj = add_arch(radius=1.5)
+        obj.data.materials.append(add_material(name, image=image, **medium))
+        add_texture(obj.data.materials[0], wide)
+        if name == "Tiles":
+            for loop in obj.data.uv_layers.active.data:
+                loop.uv[0] *= 2
+        texels = bake(obj)[0].copy()
+        assert not any("multiplies light" in line for line in state.lines())
+        tiles = [read(tile_file(tmp_path, number)) for number in (1001, 1002)] if name == "Tiles" else [texels]
+        found[name] = np.concatenate(tiles, axis=1)[..., :3]
+        bpy.data.objects.remove(obj)
+    assert found["Tiles"].shape == found["Whole"].shape
+    assert distance(found["Tiles"], found["Whole"]) < 2 * SAME

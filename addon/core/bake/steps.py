@@ -20,7 +20,7 @@ from .job import BakeJob, Step
 from .layers import LAYERS, WITHOUT_MEDIUM
 from .spreading import FINAL_EFFORT, Reports
 from .surface import Surface
-from .textured_bake import NOISY, noisy_note
+from .textured_bake import noisy_note
 
 SUNS, NARROW, WIDE = range(3)
 """Kinds of light: suns alone; one direction at each texel; any other."""
@@ -136,7 +136,7 @@ class Solve(Step):
         if job.receiver.is_bent:
             limits = bent_messages(job.name, job.surface, settings, max(bends))
             job = replace(job, illumination=job.illumination.with_messages(*limits))
-        if max(textures) > NOISY * FINAL_EFFORT.noise:
+        if max(textures) > FINAL_EFFORT.noise:
             job = replace(job, illumination=job.illumination.with_messages(noisy_note(job.name, max(textures))))
         if noise.relative() > MAX_NOISE:
             job = replace(job, illumination=job.illumination.with_messages(_noisy(job.name, noise.relative())))

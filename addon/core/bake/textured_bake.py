@@ -23,9 +23,6 @@ from .textured import Convention, TexturedPlane, continued
 # Texels along a side of mirror images in which paths are followed. More: slower; fewer: less light beyond long paths.
 MIRRORED_TEXELS = 64
 
-NOISY = 1.2
-"""Noise of a texture, over the wanted one, above which a bake names it."""
-
 
 def why_multiplied(settings: BakeSettings) -> str:
     """Part of a sentence that says why a texture has to multiply light; "" if light can scatter in it."""
@@ -44,7 +41,7 @@ def multiplied_note(name: str, why: str) -> Message:
 
 def noisy_note(name: str, noise: float) -> Message:
     """The note about the noise of an object's texture."""
-    text = f"The light in the texture of '{name}' has a noise of {100 * noise:.0f} %, since its colors differ much."
+    text = f"The light in the texture of '{name}' has a noise of {100 * noise:.1f} %, since its colors differ much."
     return note(name, text)
 
 

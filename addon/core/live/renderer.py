@@ -14,7 +14,7 @@ from ..bake.finish import finished_texture, with_seams
 from ..bake.spread_light import has_back, spread, spread_on, spread_side
 from ..bake.spreading import FINAL_EFFORT, QUICK_EFFORT, Reports, Spreading
 from ..bake.surface import channel_media
-from ..bake.textured_bake import NOISY, corrected, noisy_note, with_factors
+from ..bake.textured_bake import corrected, noisy_note, with_factors
 from ..errors import BakeError
 from ..ldf.albedo import albedo_from_reflectance
 from ..ldf.library import load_source
@@ -158,7 +158,7 @@ class LiveRenderer:
         limits = bent_messages(name, target.surface, target.settings, max(bends)) if is_bent else ()
         texture = finished_texture(framed.receiver, values, material, target.settings)
         news = [message for message in illumination.messages if message not in target.illumination.messages]
-        if max(noises) > NOISY * FINAL_EFFORT.noise:
+        if max(noises) > FINAL_EFFORT.noise:
             news.append(noisy_note(name, max(noises)))
         notes = texture_notes(target)
         messages = (*self._mesh(target).messages, *edges, *limits, *notes, *news)
