@@ -9,6 +9,14 @@ from beamspread.blender.live import timer
 from beamspread.core.scene.illumination import Illumination
 
 
+@pytest.fixture(autouse=True, scope="session")
+def folder_of_children(tmp_path_factory):
+    """Blenders that tests start and kill leave their folders among the files of the tests, which pytest removes."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setenv("TMPDIR", str(tmp_path_factory.mktemp("temporary")))
+        yield
+
+
 @pytest.fixture(autouse=True)
 def empty_file():
     """An empty scene for Cycles; the add-on stays registered."""

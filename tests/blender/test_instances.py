@@ -105,12 +105,12 @@ def change_offset(_):
 
 
 CHANGES = [
-    ("Holder", move, "object, other objects, lights"),  # the wall and the lamp stand there, too
-    ("Middle", move, "object, other objects, lights"),
+    ("Holder", move, "object, 'Wall', lights"),  # the wall and the lamp stand there, too
+    ("Middle", move, "object, 'Wall', lights"),
     ("Tile", move, "object"),
-    ("Wall", move, "other objects"),
+    ("Wall", move, "'Wall'"),
     ("Lamp", move, "lights"),
-    ("", change_offset, "object, other objects, lights"),
+    ("", change_offset, "object, 'Wall', lights"),
 ]
 
 

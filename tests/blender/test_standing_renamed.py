@@ -43,6 +43,26 @@ def test_a_copy_is_not_taken_for_the_renamed_original():
     assert Status.BAKED not in standings()
 
 
+def test_a_renamed_original_names_the_copy_beside_it():
+    """The copy takes light away; a further one that is removed again leaves nothing to say."""
+    plane = make_baked()
+    plane.name = "Renamed"
+    assert standings() == [Status.BAKED]
+    copies = [plane.copy() for _ in range(5)]
+    for number, copy in enumerate(copies):
+        copy.name, copy.location = f"Copy {number}", (0, 0, 3 + number)
+        bpy.context.collection.objects.link(copy)
+        bpy.context.view_layer.update()
+        stale.refresh(bpy.context)
+        (row,) = [row for target, row in state.rows.items() if target.object_name == "Renamed"]
+        names = [f"'Copy {n}'" for n in range(number + 1)]
+        words = ", ".join(names[:3]) + (f" and {number - 2} more objects" if number > 2 else "")
+        assert (row.status, row.messages[0].text) == (Status.STALE, f"Changed since its bake: {words}.")
+    for copy in copies:
+        bpy.data.objects.remove(copy)
+    assert standings() == [Status.BAKED]
+
+
 def test_undo_leaves_a_file_and_its_facts(tmp_path):
     bpy.context.scene.beamspread.image_storage = "FILES"
     bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "scene.blend"))

@@ -68,8 +68,11 @@ class Record:
         return self.scheme == SCHEME
 
     def changed(self, now: dict[str, str]) -> list[str]:
-        """Names of the parts whose digest differs. Parts that the record lacks count as unchanged."""
-        return [name for name, digest in now.items() if self.parts.get(name, digest) != digest]
+        """Names of the parts whose digest differs. Parts that the record lacks count as unchanged.
+
+        The first word of a part is its digest; the others tell what it consists of, and earlier versions lack them.
+        """
+        return [name for name, part in now.items() if self.parts.get(name, part).split(" ")[0] != part.split(" ")[0]]
 
     def messages(self) -> tuple[Message, ...]:
         """Messages of the bake, whose subjects are not recorded."""

@@ -132,7 +132,9 @@ class _SceneFacts:
         self._boxes.append((matrix[:3, :3] @ (low + high) / 2 + matrix[:3, 3], matrix[:3, :3] * (high - low) / 2))
         kinds = [_kinds(slot.material.original) for slot in obj.material_slots if slot.material is not None]
         self._glowing |= any(kind.glows for kind in kinds)
-        self.is_traceable &= all(kind.is_known for kind in kinds)
+        reflects = not kinds or any(kind.color is None for kind in kinds)
+        is_seen = obj.visible_diffuse and obj.visible_shadow
+        self.is_traceable &= all(kind.is_known for kind in kinds) and (is_seen or not reflects)
 
     def _add_world(self, world, view_layer) -> None:
         is_lit = world is not None and view_layer.use_sky and world.cycles_visibility.diffuse
@@ -185,14 +187,13 @@ class _SceneFacts:
             reach = max(high[:, 2].max(), -low[:, 2].min() * (surface.thickness > 0))
             is_below = reach > LOW * max(obj.dimensions)
         is_textured = target.node.has_texture()
-        is_own = self.is_traceable and not self.lamps_by_cycles
         finders = Finders(
             bounced=is_below,
-            is_own=is_own,
+            is_own=self.is_traceable and not self.lamps_by_cycles,
             world=self.world_by_cycles,
             lamps=self.lamps_by_cycles,
             colors=is_textured and not all_known(target.node.color_input(target.groups)),
-            around=self._around(target, None if shape.is_bent else grid) if is_below and is_own else Surroundings(),
+            around=self._around(target, None if shape.is_bent else grid) if is_below else Surroundings(),
         )
         surface = replace(surface, base_color=PLACEHOLDER_COLOR) if is_textured else surface
         rest = finders, self.unknown, shape.is_bent, shape.pieces

@@ -72,7 +72,7 @@ SPREAD_BOUNCED, SPREAD_BOUNCED_TEXEL = 0.15, 0.65e-6
 # Seconds until Cycles has started, and of each triangle; of the light of a lamp, of bounced light, of a panorama of the
 # world, and of a base color for each texel.
 CYCLES_START, CYCLES_TRIANGLE = 1.5, 5e-6
-CYCLES_LAMP, CYCLES_BOUNCED, CYCLES_WORLD, CYCLES_COLOR = 3.0, 6.0, 6.0, 5e-6
+CYCLES_LAMP, CYCLES_BOUNCED, CYCLES_WORLD, CYCLES_COLOR = 3.0, 4.0, 6.0, 5e-6
 
 # Fraction of the light that comes from a world, or from glowing meshes, whose light is not known, about.
 OF_WORLD, OF_MESHES = 0.5, 0.1
@@ -276,10 +276,10 @@ def textured_seconds(texels: int, threads: int, is_bent: bool = False) -> float:
     return parallel_seconds(TEXTURED * texels, threads)
 
 
-def cycles_light_seconds(world: bool, lamps: int, bounced: bool, triangles: int) -> float:
-    """Seconds in which Cycles renders the world, finds light of lamps, and bounced light."""
-    lights = CYCLES_WORLD * world + CYCLES_LAMP * lamps + CYCLES_BOUNCED * bounced
-    return CYCLES_START + parallel_seconds(lights, 0) + CYCLES_TRIANGLE * triangles
+def cycles_light_seconds(world: bool, lamps: int, bounced: float, triangles: int) -> float:
+    """Seconds in which Cycles renders the world, finds light of lamps, and in so many more bounced light."""
+    lights = CYCLES_WORLD * world + CYCLES_LAMP * lamps + CYCLES_BOUNCED * (bounced > 0)
+    return CYCLES_START + parallel_seconds(lights, 0) + bounced + CYCLES_TRIANGLE * triangles
 
 
 def cycles_color_seconds(texels: int) -> float:

@@ -23,7 +23,7 @@ from .pace import Estimate
 from .spread_light import has_back
 from .steps import Solve, needs_medium, to_simulate
 from .surface import Surface
-from .surroundings import OPEN, Surroundings, bounced_seconds
+from .surroundings import OPEN, Surroundings, bounced_seconds, bounced_seconds_of_cycles
 
 
 @dataclass(frozen=True)
@@ -80,12 +80,13 @@ class Forecast:
         if finders.colors and needs_medium(settings):
             steps.append((CYCLES_COLORS, cycles_color_seconds(texels)))
         by_cycles = bounced and not finders.is_own
+        sides = 1 + has_back(self.surface.thickness, settings)
+        nodes = sides * (NODES**2 if self.is_bent else node_count(self.grids))
         if finders.world or finders.lamps or by_cycles:
-            lights = finders.world, finders.lamps, by_cycles
+            seconds = bounced_seconds_of_cycles(finders.around, nodes, self.is_bent) if by_cycles else 0.0
+            lights = finders.world, finders.lamps, seconds
             steps.append((CYCLES_LIGHT, cycles_light_seconds(*lights, self.triangles)))
         if bounced and finders.is_own:
-            sides = 1 + has_back(self.surface.thickness, settings)
-            nodes = sides * (NODES**2 if self.is_bent else node_count(self.grids))
             seconds = bounced_seconds(self.triangles, finders.around, nodes, self.is_bent, threads, MAX_RAYS)
             steps.append((BouncedLight.name, seconds))
         unknown = max(self.unknown, OF_WORLD * finders.world)

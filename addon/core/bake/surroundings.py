@@ -25,6 +25,10 @@ OPEN_PATH, ROOM_PATH = 1.0, 1.7
 # planes and on surfaces that bend; and the fewest that are traced.
 PATHS, BENT_PATHS, MIN_PATHS = 280.0, 100.0, 4.0
 
+# The same of paths by Cycles, which nothing guides: on planes, where a filter helps, and on bent surfaces; the fewest
+# and the most; and seconds of one thread for each.
+CYCLES_PATHS, CYCLES_BENT_PATHS, CYCLES_LIMITS, CYCLES_PATH = 500.0, 2000.0, (4.0, 128.0), 4e-6
+
 # Bounced light in a closed room over the light of lamps without obstacles, about.
 BOUNCED_PART = 0.4
 
@@ -72,6 +76,13 @@ def bounced_seconds(
         part * (fixed + more * doublings) for part, (fixed, more) in ((1.0, OPEN_RAY), (around.enclosed, ROOM_RAY))
     )
     return parallel_seconds(LEARNING + rays * ray, threads)
+
+
+def bounced_seconds_of_cycles(around: Surroundings, nodes: float, is_bent: bool) -> float:
+    """Seconds in which Cycles finds bounced light at so many nodes, besides its start."""
+    least, most = CYCLES_LIMITS
+    paths = min(max((CYCLES_BENT_PATHS if is_bent else CYCLES_PATHS) * around.bounced**2, least), most)
+    return parallel_seconds(CYCLES_PATH * paths * nodes * len(STRATA), 0)
 
 
 def surroundings_of(

@@ -7,7 +7,7 @@ evaluating these takes long or only Cycles can.
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 
 import bpy
 
@@ -20,10 +20,28 @@ from ...read.scene_cache import scene_cache
 from ...read.visibility import by_name
 from .object_digests import ObjectDigests, surface_values, texture_tree
 
-Parts = dict[str, str]
-"""Digests of the parts of a scene that a bake reads, by names for artists."""
 
-IMAGE, QUALITY, SETTINGS = "size of the image", "quality", "settings"
+class Parts(dict[str, str]):
+    """Digests of the parts of a scene that a bake reads, by names for artists.
+
+    Attributes
+    ----------
+    objects : names of the other objects by their digests, which follow the digest of all in `OTHERS`.
+    """
+
+    objects: Mapping[str, str] = {}
+
+
+IMAGE, QUALITY, SETTINGS, OTHERS = "size of the image", "quality", "settings", "other objects"
+
+MAX_OBJECTS = 300
+"""Number of other objects up to which each has a digest of its own; more make images larger by 9 bytes each."""
+
+EACH = "each:"
+"""Word before the digests of single objects; records of earlier versions lack both."""
+
+MAX_NAMED = 3
+"""Number of changed objects that are named."""
 
 # Cycles' settings for bounced light.
 BOUNCES = (
@@ -50,9 +68,10 @@ def fingerprints(context, targets: Iterable[Target], is_for_bake: bool = False) 
         if place is None:
             continue
         texture, number = texture_tree(material, *place), objects.solids[obj.name]
-        parts[target] = {
+        others = {_text(other, 8): name for name, other in objects.solids.items() if name != obj.name}
+        values = {
             "object": _text(number),
-            "other objects": _text(objects.solids.total() - number),
+            OTHERS: " ".join([_text(objects.solids.total() - number), *_each_of(others)]),
             "lights": _text(objects.lamps),
             "world": world,
             "textures": _digest_of({*objects.images, *texture.images} - results),
@@ -61,11 +80,31 @@ def fingerprints(context, targets: Iterable[Target], is_for_bake: bool = False) 
             QUALITY: _quality(scene),
             IMAGE: image_part(image_of_side(place[0], target.side)),
         }
+        parts[target] = Parts(values)
+        parts[target].objects = others
     return parts
 
 
-def _text(total: int) -> str:
-    return f"{total % 2**64:x}"
+def changed_objects(before: str, now: Parts) -> str:
+    """Words for the other objects that differ between a part `OTHERS` of a bake and present ones."""
+    _, *count, known = before.partition(f" {EACH}")
+    if not any(count) or len(now.objects) > MAX_OBJECTS:
+        return OTHERS
+    changed = sorted(name for number, name in now.objects.items() if number not in known.split(" "))
+    if not changed:
+        return "removed or hidden objects"
+    more = f" and {len(changed) - MAX_NAMED} more objects" if len(changed) > MAX_NAMED else ""
+    return ", ".join(f"'{name}'" for name in changed[:MAX_NAMED]) + more
+
+
+def _each_of(others: Iterable[str]) -> list[str]:
+    """The digest of each of the other objects, unless there are too many."""
+    numbers = sorted(others)
+    return [EACH, *numbers] if len(numbers) <= MAX_OBJECTS else []
+
+
+def _text(total: int, digits: int = 16) -> str:
+    return f"{total % 16**digits:x}"
 
 
 def _digest_of(images: Iterable[str]) -> str:

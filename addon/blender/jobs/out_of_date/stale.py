@@ -40,7 +40,7 @@ from ..announced import MAX_TARGETS, announce
 from ..frozen import frozen
 from ..problems import problems_of
 from ..state import Row, Status, redraw, state
-from .fingerprint import IMAGE, QUALITY, Parts, fingerprints, image_part
+from .fingerprint import IMAGE, OTHERS, QUALITY, Parts, changed_objects, fingerprints, image_part
 
 REST_SECONDS = 0.3
 """Seconds without changes before a scan."""
@@ -175,7 +175,7 @@ def _row(target: Target, image, record: Record | None, now: Parts | None) -> Row
     subject, unknown = str(target), () if record.is_comparable() else (note(str(target), *UNKNOWN),)
     earlier = (*_why_later(image), *record.messages(), *unknown)
     if changed and changed != [QUALITY]:
-        why = warning(subject, f"Changed since its bake: {', '.join(changed)}.")
+        why = warning(subject, f"Changed since its bake: {_named(changed, record, now)}.")
         return Row(target, Status.STALE, (why, *earlier), True)
     again = [warning(subject, _why_again(record.parts[QUALITY], now[QUALITY]))] if changed else []
     status = Status.WARNED if any(message.level == Level.WARNING for message in (*again, *earlier)) else Status.BAKED
@@ -187,6 +187,11 @@ def _changed(record: Record, now: Parts) -> list[str]:
     return record.changed(now if record.is_comparable() else {QUALITY: now[QUALITY]})
 
 
+def _named(changed: list[str], record: Record, now: Parts) -> str:
+    """The changed parts in words."""
+    return ", ".join(changed_objects(record.parts[OTHERS], now) if name == OTHERS else name for name in changed)
+
+
 def _row_of_frames(target: Target, frames: Frames, record: Record | None, now: Parts | None) -> Row:
     """The row of an image sequence, by the frame that is shown. A bake does not renew it, so it is not up for one."""
     subject, shown = str(target), f"Shows the frames {frames.first} to {frames.last} of a batch."
@@ -194,7 +199,7 @@ def _row_of_frames(target: Target, frames: Frames, record: Record | None, now: P
         return Row(target, Status.BAKED, (note(subject, f"{shown} Changes since then are not known."),))
     warnings, changed = record.messages(), record.changed(now)
     if changed:
-        why = warning(subject, f"{shown} Changed since this frame was baked: {', '.join(changed)}.")
+        why = warning(subject, f"{shown} Changed since this frame was baked: {_named(changed, record, now)}.")
         return Row(target, Status.STALE, (why, *warnings))
     return Row(target, Status.WARNED if warnings else Status.BAKED, (note(subject, shown), *warnings))
 

@@ -101,7 +101,7 @@ class BakePlan:
             world=len(light.by_cycles) > lamps,
             lamps=lamps,
             colors=self.color is not None and bool(self.color.unknown),
-            around=self._around(grids, light, len(light.by_cycles) > lamps) if bounced and is_own else Surroundings(),
+            around=self._around(grids, light, len(light.by_cycles) > lamps) if bounced else Surroundings(),
         )
         facts = light.lights, light.triangle_count, self.surface_with_color(), finders
         return Forecast(name, grids, *facts, is_bent=self.mesh.is_bent)
