@@ -172,6 +172,7 @@ void bind_surface(py::module_& m)
             "clear", [](HeldField& self) { self.field().clear(); }, "Remove all rays.")
         .def("solve", &HeldField::solve, py::arg("progress") = py::none(), "Luminance, float32 (N, channels).")
         .def_property_readonly("beyond_share", [](HeldField& self) { return self.field().beyond_share(); })
+        .def_property_readonly("mean_sources", [](HeldField& self) { return self.field().mean_sources(); })
         .def_property_readonly("moment_bytes", [](HeldField& self) { return self.field().moment_bytes(); })
         .def_property_readonly(
             "functions",

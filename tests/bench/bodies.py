@@ -94,18 +94,22 @@ class Run:
         self.luminance, solve_wall, solve_cpu = timed(field.solve)
         self.wall, self.cpu = wall + add_wall + solve_wall, cpu + add_cpu + solve_cpu
         self.parts = f"{cpu:.2f} + {add_cpu:.2f} + {solve_cpu:.2f} s"
-        self.bytes = field.moment_bytes
+        self.bytes, self.sources = field.moment_bytes, field.mean_sources
 
 
 def growth(ldf, counts):
-    print("\nseconds to prepare, add a lamp and solve; wall seconds over those asked for; bytes of a sample's moments")
+    print(
+        "\nseconds to prepare, add a lamp and solve; wall seconds over those asked for; "
+        "bytes of a sample's moments, its sources"
+    )
     for body in (ball, waves):
         for texels in (0.1, 1.0, 4.0, 16.0):
             for count in counts:
                 run = Run(ldf, under_lamp(body, count), texels)
                 print(
                     f"  {body.__name__:5s} path {texels:4g} texels, {count:8d} samples: {run.parts}, "
-                    f"wall {run.wall:.2f} s = {run.wall * PER_SECOND / count:.2f}, {run.bytes} bytes",
+                    f"wall {run.wall:.2f} s = {run.wall * PER_SECOND / count:.2f}, {run.bytes} bytes, "
+                    f"{run.sources:.0f} sources",
                     flush=True,
                 )
 

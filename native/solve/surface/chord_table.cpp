@@ -18,7 +18,6 @@ constexpr float disk_end_radii = 8.0f;
 constexpr float disk_first_radii = 1.0f;
 
 // Fraction of the tolerance that functions may have where they are left out. Larger: less time for light far away.
-// The first block always stays: what it lacks far away has one sign and adds up over the surface.
 constexpr double block_share = 0.5;
 
 // Least chord, in radii of a disk, at which curvatures are compared: both profiles are infinite at the pole.
@@ -40,8 +39,9 @@ struct DiskPoints {
     DiskPoints(double c, double radius)
     {
         for (std::size_t p = 0; p < count; ++p) {
-            const double ring = radius * std::sqrt((static_cast<double>(p / compared_azimuths) + 0.5) /
-                                                   static_cast<double>(compared_rings));
+            const std::size_t number = p / compared_azimuths;
+            const double ring =
+                radius * std::sqrt((static_cast<double>(number) + 0.5) / static_cast<double>(compared_rings));
             const double turn =
                 pi * (static_cast<double>(p % compared_azimuths) + 0.5) / static_cast<double>(compared_azimuths);
             const double x = c + ring * std::cos(turn);
@@ -68,26 +68,36 @@ struct DiskPoints {
     }
 };
 
+// Largest value of each lane of a row, of all curvatures, where the light is at its most in each function.
+std::vector<double> largest_values(const SurfaceBasis& basis, const ChordTable& point, std::size_t result,
+                                   std::size_t row)
+{
+    std::vector<double> largest(basis.largest.size());
+    for (std::size_t lane = 0; lane < largest.size(); ++lane) {
+        float value = 0.0f;
+        for (std::size_t k = 0; k < curvature_count(basis, result); ++k)
+            value = std::max(value, std::abs(point.values[result][(k * point.rows + row) * basis.functions() + lane]));
+        largest[lane] = static_cast<double>(value * basis.largest[lane]);
+    }
+    return largest;
+}
+
 void choose_blocks(const SurfaceBasis& basis, double tolerance, PointTable& table)
 {
-    const std::size_t blocks = basis.blocks;
-    const std::size_t lanes = basis.functions();
     const ChordTable& point = table.light;
-    table.blocks.assign(point.rows, 0);
+    table.blocks.assign(point.rows, {});
     for (std::size_t r = 0; r < point.values.size(); ++r) {
-        // Power beyond a chord of each block and those after it; the light is at its most in each function.
-        std::vector<double> beyond(blocks);
+        // Power beyond a chord of each block and those after it.
+        std::vector<double> beyond(basis.blocks);
         double all = 0.0;
+        bool is_lit = false;
         for (const bool is_known : {false, true})
             for (std::size_t row = point.rows; row-- > 0;) {
-                std::vector<double> power(blocks);
-                for (std::size_t lane = 0; lane < basis.largest.size(); ++lane) {
-                    float value = 0.0f;
-                    for (std::size_t k = 0; k < curvature_count(basis, r); ++k)
-                        value = std::max(value, std::abs(point.values[r][(k * point.rows + row) * lanes + lane]));
+                std::vector<double> power(basis.blocks);
+                const std::vector<double> largest = largest_values(basis, point, r, row);
+                for (std::size_t lane = 0; lane < largest.size(); ++lane)
                     for (std::size_t b = 0; b <= lane / lanes_per_block; ++b)
-                        power[b] += static_cast<double>(value * basis.largest[lane]);
-                }
+                        power[b] += largest[lane];
                 const float chord = chord_of(point.first + static_cast<std::uint32_t>(row));
                 const float next = chord_of(point.first + static_cast<std::uint32_t>(row + 1));
                 const double octave = std::log(static_cast<double>(next / chord));
@@ -95,25 +105,31 @@ void choose_blocks(const SurfaceBasis& basis, double tolerance, PointTable& tabl
                     all += octave * power[0];
                     continue;
                 }
-                for (std::size_t b = 0; b < blocks; ++b) {
+                // What the first block lacks far away has one sign and adds up over the surface: it stays to its end.
+                is_lit = is_lit || power[0] > 0.0;
+                for (std::size_t b = 0; b < basis.blocks; ++b) {
                     beyond[b] += octave * power[b];
-                    if (b == 0 || beyond[b] > block_share * tolerance * all)
-                        table.blocks[row] = std::max(table.blocks[row], static_cast<std::uint8_t>(b + 1));
+                    if (b == 0 ? is_lit : beyond[b] > block_share * tolerance * all)
+                        table.blocks[row][r] = static_cast<std::uint8_t>(b + 1);
                 }
             }
     }
 }
 
-void make_laplacian(const SurfaceBasis& basis, PointTable& table)
+void make_derivatives(const SurfaceBasis& basis, PointTable& table)
 {
     const ChordTable& point = table.light;
     ChordTable& laplacian = table.laplacian;
     laplacian.first = point.first;
     laplacian.rows = point.rows;
+    table.along = laplacian;
+    table.across = laplacian;
     const std::size_t lanes = basis.functions();
     for (std::size_t r = 0; r < point.values.size(); ++r) {
         const std::size_t nodes = curvature_count(basis, r);
         AlignedVector<float>& values = laplacian.values.emplace_back(point.values[r].size(), 0.0f);
+        AlignedVector<float>& along = table.along.values.emplace_back(point.values[r].size(), 0.0f);
+        AlignedVector<float>& across = table.across.values.emplace_back(point.values[r].size(), 0.0f);
         parallel_for(nodes * point.rows, [&](std::size_t item) {
             const std::size_t curvature = item / point.rows;
             const std::size_t row = item % point.rows;
@@ -135,6 +151,10 @@ void make_laplacian(const SurfaceBasis& basis, PointTable& table)
                     const double first = (after[m] - before[m]) / (2.0 * derivative_step);
                     values[item * lanes + lane] = static_cast<float>(
                         (second + first - static_cast<double>(m * m) * here[m]) * in_paths * in_paths);
+                    along[item * lanes + lane] = static_cast<float>(
+                        (second - first + static_cast<double>(m * m) * here[m]) * in_paths * in_paths);
+                    across[item * lanes + lane] =
+                        static_cast<float>((static_cast<double>(2 * m) * (here[m] - first)) * in_paths * in_paths);
                 }
             }
         });
@@ -261,7 +281,7 @@ PointTable make_point(const SurfaceBasis& basis, float first, float reach, doubl
     point.light.first = chord_step(first);
     fill_chord_table(basis, point.light, 0.0f, reach);
     choose_blocks(basis, tolerance, point);
-    make_laplacian(basis, point);
+    make_derivatives(basis, point);
     return point;
 }
 

@@ -1,6 +1,7 @@
 // Tables over the chord of the light that a surface returns around a sample.
 #pragma once
 
+#include <array>
 #include <bit>
 #include <cstddef>
 #include <cstdint>
@@ -25,6 +26,9 @@ inline float chord_of(std::uint32_t step)
 {
     return std::bit_cast<float>(step << within_chord_bits);
 }
+
+// Largest number of results of a pair.
+inline constexpr std::size_t max_results = 3;
 
 // Values e(c, k) c^2 without unit, for light that comes from a point or a disk. They change slowly with the chord c.
 struct ChordTable {
@@ -57,8 +61,10 @@ struct DiskTable {
 // Light of a point.
 struct PointTable {
     ChordTable light;
-    ChordTable laplacian;  // c^4 times e'' + e' / c - m^2 e / c^2, with the rows of `light`
-    std::vector<std::uint8_t> blocks;  // [row] blocks that matter from this chord on
+    // Second derivatives times c^4, with the rows of `light`: e'' + e' / c - m^2 e / c^2; that along the chord less that
+    // across it, e'' - e' / c + m^2 e / c^2; and that along both, 2 m (e / c^2 - e' / c).
+    ChordTable laplacian, along, across;
+    std::vector<std::array<std::uint8_t, max_results>> blocks;  // [row][result] that matter from this chord on
 };
 
 // Functions of a result on a surface of a curvature, [rank].

@@ -110,6 +110,8 @@ struct Pairs {
     Floats curvature;
     Floats cosine;  // of the chord's azimuth in the tangent plane of the source, times the fade
     Floats sine;
+    Floats along;  // half of a cluster's squares over chord^2: those along the chord less a half of all
+    Floats across;  // and those of the chord and a line across it, negative
 };
 
 // Rows of a table around a chord and a curvature, and their weights, for each target.
@@ -153,10 +155,12 @@ struct Rows {
     pairs.part = part < zero ? zero : part > one ? one : part;
     pairs.step = step - first;
     const Floats least = chord < before ? before : chord;
-    pairs.per_square = one / (least * least);
+    const Floats square = least * least;
+    pairs.per_square = one / square;
     pairs.curvature =
-        ((target[3] - source.normal.x) * dx + (target[4] - source.normal.y) * dy + (target[5] - source.normal.z) * dz) *
-        pairs.per_square;
+        (target[3] - source.normal.x) * dx + (target[4] - source.normal.y) * dy + (target[5] - source.normal.z) * dz;
+    pairs.curvature = is_cluster ? (pairs.curvature + source.bend) / (square + 4.0f * source.spread)
+                                 : pairs.curvature * pairs.per_square;
     const Floats x = dx * source.tangent.x + dy * source.tangent.y + dz * source.tangent.z;
     const Floats y = dx * source.binormal.x + dy * source.binormal.y + dz * source.binormal.z;
     Floats across = x * x + y * y;
@@ -169,6 +173,18 @@ struct Rows {
     const Floats per_across = one / (across < least_across ? least_across : across);
     pairs.cosine = x * per_across;
     pairs.sine = y * per_across;
+    if (is_cluster) {
+        const auto& [xx, yy, zz, xy, yz, zx] = source.squares;
+        const Floats by_x = xx * dx + xy * dy + zx * dz;
+        const Floats by_y = xy * dx + yy * dy + yz * dz;
+        const Floats by_z = zx * dx + yz * dy + zz * dz;
+        const Floats half_fourth = 0.5f * pairs.per_square * pairs.per_square;
+        pairs.along = (by_x * dx + by_y * dy + by_z * dz - 2.0f * source.spread * square) * half_fourth;
+        const Floats to_x = pairs.sine * source.tangent.x - pairs.cosine * source.binormal.x;
+        const Floats to_y = pairs.sine * source.tangent.y - pairs.cosine * source.binormal.y;
+        const Floats to_z = pairs.sine * source.tangent.z - pairs.cosine * source.binormal.z;
+        pairs.across = (by_x * to_x + by_y * to_y + by_z * to_z) * chord * half_fourth;
+    }
 }
 
 [[gnu::always_inline]] inline void find_rows(const PairTables& tables, const PairSource& source, const Pairs& pairs,
@@ -207,6 +223,24 @@ struct Rows {
                    to_next * pairs.part};
 }
 
+using BlockCounts = std::array<std::uint8_t, max_results>;
+
+[[gnu::always_inline]] inline bool has_disk(const Pairs& pairs, std::size_t count)
+{
+    std::int32_t any = 0;
+    for (std::size_t i = 0; i < count; ++i)
+        any |= pairs.is_disk[i];
+    return any != 0;
+}
+
+[[gnu::always_inline]] inline std::size_t least_step(const Pairs& pairs, std::size_t count)
+{
+    std::int32_t least = pairs.step[0];
+    for (std::size_t i = 1; i < count; ++i)
+        least = std::min(least, pairs.step[i]);
+    return static_cast<std::size_t>(least);
+}
+
 template <std::size_t most_results, bool are_clusters>
 void add_pairs_of(const PairTables& tables, const PairTargets& targets, std::span<const PairSource> sources,
                   const float* moments, std::size_t stride, float* sums, float* beyond)
@@ -220,21 +254,34 @@ void add_pairs_of(const PairTables& tables, const PairTargets& targets, std::spa
     std::array<std::array<Lanes, most_results>, PairTargets::most> all{};
     std::array<Lanes, PairTargets::most> clamped{};
     const std::size_t lanes = tables.blocks * lanes_per_block;
+    const BlockCounts* point_blocks = tables.point->blocks.data();
+    BlockCounts all_blocks;
+    all_blocks.fill(static_cast<std::uint8_t>(tables.blocks));
     Pairs pairs;
     std::array<Rows, most_results> rows;
     for (const PairSource& source : sources) {
         find_pairs(tables, target, source, are_clusters, pairs);
         Integers is_inside{};
+        const BlockCounts most = are_clusters || !has_disk(pairs, targets.count)
+                                     ? point_blocks[least_step(pairs, targets.count)]
+                                     : all_blocks;
         for (std::size_t r = results; r-- > 0;)
-            find_rows(tables, source, pairs, tables.scales[r], are_clusters, is_inside, rows[r]);
+            if (most[r] > 0)
+                find_rows(tables, source, pairs, tables.scales[r], are_clusters, is_inside, rows[r]);
         const float* of_source = moments + source.moments * stride;
         for (std::size_t i = 0; i < targets.count; ++i) {
             if (!(pairs.chord[i] < tables.reach) || (!are_clusters && source.moments == targets.own[i]))
                 continue;
             const bool is_disk = !are_clusters && pairs.is_disk[i] != 0;
+            const BlockCounts& counts = is_disk ? all_blocks : point_blocks[static_cast<std::size_t>(pairs.step[i])];
             bool at_node = true;
-            for (std::size_t r = 0; r < results; ++r)
-                at_node = at_node && rows[r].to_high[i] == 0;
+            std::size_t blocks = 0;
+            for (std::size_t r = 0; r < results; ++r) {
+                at_node = at_node && (counts[r] == 0 || rows[r].to_high[i] == 0);
+                blocks = std::max<std::size_t>(blocks, counts[r]);
+            }
+            if (blocks == 0)
+                continue;
             const ChordTable& table = is_disk ? tables.disks[source.disk]->light : tables.point->light;
             Harmonics8 real, imaginary;
             powers(pairs.cosine[i], pairs.sine[i], real, imaginary);
@@ -256,30 +303,40 @@ void add_pairs_of(const PairTables& tables, const PairTargets& targets, std::spa
                                              load(high + lanes, row[1]);
                                              value += row[0] * rows[r].weight[2][i] + row[1] * rows[r].weight[3][i];
                                          };
-            const auto step = static_cast<std::size_t>(pairs.step[i]);
-            const std::size_t blocks = is_disk ? tables.blocks : tables.point->blocks[step];
             for (std::size_t b = 0; b < blocks; ++b) {
                 const std::size_t at = b * lanes_per_block;
                 Lanes cosines, sines;
                 spread(real, tables.harmonic.data() + at, cosines);
                 spread(imaginary, tables.harmonic.data() + at, sines);
                 Lanes light{};
+                Lanes turned{};
+                std::size_t set = tables.results;
                 for (std::size_t r = 0; r < results; ++r) {
-                    if (r == 0 || tables.set[r] != tables.set[r - 1]) {
-                        const float* values = of_source + (tables.set[r] * tables.blocks + b) * 2 * lanes_per_block;
+                    if (b >= counts[r])
+                        continue;
+                    if (tables.set[r] != set) {
+                        set = tables.set[r];
+                        const float* values = of_source + (set * tables.blocks + b) * 2 * lanes_per_block;
                         std::array<Lanes, 2> pair;
                         load(values, pair[0]);
                         load(values + lanes_per_block, pair[1]);
                         light = pair[0] * cosines + pair[1] * sines;
+                        if constexpr (are_clusters)
+                            turned = pair[1] * cosines - pair[0] * sines;
                     }
                     Lanes value;
                     interpolate(r, table.values[r].data() + at, value);
-                    if constexpr (are_clusters) {
+                    Lanes product = light * value;
+                    // The functions of other blocks are small.
+                    if (are_clusters && b == 0) {
                         Lanes second;
                         interpolate(r, tables.point->laplacian.values[r].data() + at, second);
                         value += second * (source.spread * pairs.per_square[i]);
+                        interpolate(r, tables.point->along.values[r].data() + at, second);
+                        value += second * pairs.along[i];
+                        interpolate(r, tables.point->across.values[r].data() + at, second);
+                        product = light * value + turned * (second * pairs.across[i]);
                     }
-                    const Lanes product = light * value;
                     all[i][r] += product;
                     if (r == 0 && is_inside[i] == 0)
                         clamped[i] += product;
@@ -299,14 +356,17 @@ void add_pairs_of_kind(const PairTables& tables, const PairTargets& targets, std
                        const float* moments, std::size_t stride, float* sums, float* beyond)
 {
     static_assert(max_results == 3);
-    if constexpr (is_plain)
-        add_pairs_of<3, are_clusters>(tables, targets, sources, moments, stride, sums, beyond);
-    else if (tables.results == 1)
-        add_pairs_of<1, are_clusters>(tables, targets, sources, moments, stride, sums, beyond);
-    else if (tables.results == 2)
-        add_pairs_of<2, are_clusters>(tables, targets, sources, moments, stride, sums, beyond);
-    else
-        add_pairs_of<3, are_clusters>(tables, targets, sources, moments, stride, sums, beyond);
+    if constexpr (!is_plain) {
+        if (tables.results == 1) {
+            add_pairs_of<1, are_clusters>(tables, targets, sources, moments, stride, sums, beyond);
+            return;
+        }
+        if (tables.results == 2) {
+            add_pairs_of<2, are_clusters>(tables, targets, sources, moments, stride, sums, beyond);
+            return;
+        }
+    }
+    add_pairs_of<3, are_clusters>(tables, targets, sources, moments, stride, sums, beyond);
 }
 
 void add_pairs(const PairTables& tables, const PairTargets& targets, std::span<const PairSource> sources,

@@ -22,10 +22,9 @@ struct PairSource {
     std::uint32_t moments;  // index of its moments
     Vec3f binormal;  // y of the frame
     float spread;  // a quarter of the mean squared distance of a cluster's light from its position, m^2
+    float bend = 0.0f;  // mean product of a cluster's normals and positions, less that of their means, m
+    std::array<float, 6> squares{};  // means of xx, yy, zz, xy, yz, zx of a cluster's light around its position, m^2
 };
-
-// Largest number of results of a pair.
-inline constexpr std::size_t max_results = 3;
 
 // Targets side by side, which share their sources.
 struct PairTargets {

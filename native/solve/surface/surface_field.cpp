@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <iomanip>
-#include <optional>
+#include <numeric>
 #include <sstream>
 #include <utility>
 
@@ -25,8 +25,8 @@ constexpr std::size_t leaves_at_once = 16;
 // Bounds on the error of a far cluster's light over the tolerance that are tried, from the largest on, each half of the
 // one before. The first one is taken whose probed samples differ from those with a quarter of it by less than a fraction
 // of the tolerance: errors of other samples are larger. Larger fraction: fewer pairs, larger errors.
-constexpr double most_share = 64.0;
-constexpr double least_share = 1e-4;
+constexpr double most_share = 1024.0;
+constexpr std::size_t shares = 24;
 constexpr double probed_fraction = 0.25;
 
 // Leaves of which samples are probed: the brightest and others. More: errors closer to the tolerance, more time.
@@ -115,9 +115,9 @@ std::shared_ptr<SurfaceKernels> checked_kernels(const SurfaceProblem& problem)
 
 PairTables tables_of(const SurfaceProblem& problem, SurfaceKernels& kernels)
 {
-    std::optional<PairTables> tables;
-    with_threads(problem.threads, [&] { tables.emplace(kernels, areas_of(problem.samples)); });
-    return *std::move(tables);
+    std::vector<PairTables> tables;
+    with_threads(problem.threads, [&] { tables.emplace_back(kernels, areas_of(problem.samples)); });
+    return std::move(tables.front());
 }
 
 }  // namespace
@@ -213,10 +213,12 @@ void SurfaceField::solve(Progress& progress, float* luminance)
 {
     std::fill_n(luminance, m_problem.samples.size() * m_problem.channels.size(), 0.0f);
     m_beyond_share = 0.0;
+    m_mean_sources = 0.0;
     if (m_basis.moments() == 0)
         return;
     const std::size_t items = (m_tree.leaves() + leaves_at_once - 1) / leaves_at_once;
     std::vector<Areas> areas(items);
+    std::vector<std::size_t> pairs(items);
     with_threads(m_problem.threads, [&] {
         m_tree.gather(m_basis, m_tables, m_moments);
         const SurfaceTree::Opening opening = m_problem.is_direct ? SurfaceTree::Opening{} : find_opening();
@@ -224,7 +226,7 @@ void SurfaceField::solve(Progress& progress, float* luminance)
             SurfaceTree::Sources& sources = m_sources.local();
             const std::size_t end = std::min(m_tree.leaves(), (item + 1) * leaves_at_once);
             for (std::size_t leaf = item * leaves_at_once; leaf < end; ++leaf)
-                solve_leaf(leaf, opening, sources, [&](std::size_t sample, const Exitance& exitance) {
+                pairs[item] += solve_leaf(leaf, opening, sources, [&](std::size_t sample, const Exitance& exitance) {
                     store(sample, exitance, areas[item], luminance);
                 });
             progress.advance(1.0 / static_cast<double>(items));
@@ -236,6 +238,8 @@ void SurfaceField::solve(Progress& progress, float* luminance)
         all += area;
     }
     m_beyond_share /= all;
+    m_mean_sources = static_cast<double>(std::accumulate(pairs.begin(), pairs.end(), std::size_t{0})) /
+                     static_cast<double>(m_problem.samples.size());
 }
 
 // The error of a cluster's light is at most about its weight times its squared size times the kernel's second derivative.
@@ -275,8 +279,8 @@ SurfaceTree::Opening SurfaceField::find_opening()
     }
     std::array<SurfaceTree::Opening, 3> openings;  // the last ones, in turn, and their results
     std::array<std::vector<Exitances>, 3> found;
-    double share = most_share;
-    for (std::size_t i = 0; share >= least_share; ++i, share *= 0.5) {
+    for (std::size_t i = 0; i < shares; ++i) {
+        const double share = std::ldexp(most_share, -static_cast<int>(i));
         SurfaceTree::Opening& opening = openings[i % 3];
         opening = {0.0f, m_tables.point->light.first, {}};
         for (const double value : bound)
@@ -293,8 +297,10 @@ SurfaceTree::Opening SurfaceField::find_opening()
     return {};
 }
 
-void SurfaceField::solve_leaf(std::size_t leaf, const SurfaceTree::Opening& opening, SurfaceTree::Sources& sources,
-                              const std::function<void(std::size_t, const Exitance&)>& store_exitance) const
+// Returns the number of pairs.
+std::size_t SurfaceField::solve_leaf(std::size_t leaf, const SurfaceTree::Opening& opening,
+                                     SurfaceTree::Sources& sources,
+                                     const std::function<void(std::size_t, const Exitance&)>& store_exitance) const
 {
     m_tree.find(leaf, opening, m_tables.reach, sources);
     PairTargets targets;
@@ -315,6 +321,7 @@ void SurfaceField::solve_leaf(std::size_t leaf, const SurfaceTree::Opening& open
             add_self(targets.own[k], exitance.sums);
         store_exitance(targets.own[k], exitance);
     }
+    return targets.count * (sources.near.size() + sources.far.size());
 }
 
 // The surface goes on beyond the edge of a cut sample. Where light spreads less than a sample, that of its neighbors does

@@ -60,6 +60,9 @@ public:
     // Share of the area whose light comes from pairs that bend more than the media's LDFs cover; after `solve`.
     double beyond_share() const { return m_beyond_share; }
 
+    // Mean number of sources, samples and clusters, of a sample's light; after `solve`.
+    double mean_sources() const { return m_mean_sources; }
+
     // Bytes of a sample's moments.
     std::size_t moment_bytes() const { return m_basis.moments() * sizeof(float); }
 
@@ -82,8 +85,8 @@ private:
     using Areas = std::array<double, 2>;
 
     SurfaceTree::Opening find_opening();
-    void solve_leaf(std::size_t leaf, const SurfaceTree::Opening& opening, SurfaceTree::Sources& sources,
-                    const std::function<void(std::size_t, const Exitance&)>& store_exitance) const;
+    std::size_t solve_leaf(std::size_t leaf, const SurfaceTree::Opening& opening, SurfaceTree::Sources& sources,
+                           const std::function<void(std::size_t, const Exitance&)>& store_exitance) const;
     float own_area(std::size_t sample) const;
     LatticeShape lattice(std::size_t sample) const;
     void add_self(std::size_t sample, std::array<float, 3>& sums) const;
@@ -101,6 +104,7 @@ private:
     PerThread<Scratch> m_scratch;
     PerThread<SurfaceTree::Sources> m_sources;
     double m_beyond_share = 0.0;
+    double m_mean_sources = 0.0;
 };
 
 }  // namespace beamspread

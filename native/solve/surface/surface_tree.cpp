@@ -15,7 +15,14 @@ namespace beamspread {
 namespace {
 
 // Samples of a leaf, at most. They share their sources. More: fewer searches, more pairs.
-constexpr std::size_t leaf_size = 8;
+constexpr std::size_t leaf_size = PairTargets::most;
+
+// Samples of the smallest clusters, at most: leaves of more are parted once more. More: less memory, more pairs.
+constexpr std::size_t tip_size = 4;
+
+// Samples of a node, at most, which is parted at the middle of its longest side, to whole leaves, rather than by codes.
+// More: fuller leaves, and clusters that look less like squares.
+constexpr std::size_t parted_size = 128;
 
 // Bits of a position along each axis in its code, and of the side that its normal faces.
 constexpr int axis_bits = 20;
@@ -129,6 +136,15 @@ void add_turned(const SurfaceBasis& basis, const std::array<float, 2>& turned, f
     }
 }
 
+// Adds the products of a vector's coordinates, xx, yy, zz, xy, yz and zx, times a factor.
+void add_squares(const Vec3f& v, float factor, std::array<float, 6>& squares)
+{
+    const Vec3f by = factor * v;
+    const std::array<float, 6> products = {by.x * v.x, by.y * v.y, by.z * v.z, by.x * v.y, by.y * v.z, by.z * v.x};
+    for (std::size_t i = 0; i < products.size(); ++i)
+        squares[i] += products[i];
+}
+
 // Sets the frame of a cluster, whose mean normal is 0 where those of its parts cancel.
 void set_frame(const Vec3f& normal, PairSource& cluster)
 {
@@ -151,11 +167,11 @@ SurfaceTree::SurfaceTree(std::span<const SurfaceSample> samples)
               [&](std::uint32_t a, std::uint32_t b) { return codes[a] != codes[b] ? codes[a] < codes[b] : a < b; });
     for (const std::uint32_t sample : m_order)
         m_codes.push_back(codes[sample]);
-    build(0, samples.size());
+    build(0, samples.size(), false);
     m_codes = {};
 }
 
-std::uint32_t SurfaceTree::build(std::size_t begin, std::size_t end)
+std::uint32_t SurfaceTree::build(std::size_t begin, std::size_t end, bool is_in_leaf)
 {
     const auto number = static_cast<std::uint32_t>(m_nodes.size());
     Node node;
@@ -170,8 +186,23 @@ std::uint32_t SurfaceTree::build(std::size_t begin, std::size_t end)
     node.middle = 0.5f * (low + high);
     node.radius = 0.5f * glm::length(high - low);
     m_nodes.push_back(node);
-    if (end - begin <= leaf_size) {
+    if (end - begin <= leaf_size && !is_in_leaf)
         m_leaves.push_back(number);
+    if (end - begin <= tip_size)
+        return number;
+    if (end - begin <= parted_size) {
+        const Vec3f size = high - low;
+        const int axis = size.x >= size.y && size.x >= size.z ? 0 : size.y >= size.z ? 1 : 2;
+        const std::size_t part = end - begin <= leaf_size ? tip_size : leaf_size;
+        const std::size_t middle = begin + (end - begin + part - 1) / part / 2 * part;
+        const auto at = [&](std::size_t i) { return m_order.begin() + static_cast<std::ptrdiff_t>(i); };
+        std::nth_element(at(begin), at(middle), at(end), [&](std::uint32_t a, std::uint32_t b) {
+            const float first = m_samples[a].position[axis];
+            const float second = m_samples[b].position[axis];
+            return first != second ? first < second : a < b;
+        });
+        build(begin, middle, end - begin <= leaf_size);
+        m_nodes[number].second = build(middle, end, end - begin <= leaf_size);
         return number;
     }
     // Part the samples where the first bit changes in which their codes differ; equal codes in the middle.
@@ -185,8 +216,8 @@ std::uint32_t SurfaceTree::build(std::size_t begin, std::size_t end)
             std::partition_point(first, last, [bit](std::uint64_t code) { return (code & bit) == 0; }) -
             m_codes.begin());
     }
-    build(begin, middle);
-    m_nodes[number].second = build(middle, end);
+    build(begin, middle, false);
+    m_nodes[number].second = build(middle, end, false);
     return number;
 }
 
@@ -242,9 +273,10 @@ void SurfaceTree::gather(const SurfaceBasis& basis, const PairTables& tables, st
     weigh(basis, tables, moments);
     const auto sums_of = [&](std::size_t node) { return moments.data() + (count + node) * stride; };
     std::fill(moments.begin() + static_cast<std::ptrdiff_t>(count * stride), moments.end(), 0.0f);
-    parallel_for(m_leaves.size() / at_once + 1, [&](std::size_t item) {
-        for (std::size_t i = item * at_once; i < std::min(m_leaves.size(), (item + 1) * at_once); ++i)
-            gather_leaf(basis, moments, m_nodes[m_leaves[i]], sums_of(m_leaves[i]));
+    parallel_for(m_nodes.size() / at_once + 1, [&](std::size_t item) {
+        for (std::size_t i = item * at_once; i < std::min(m_nodes.size(), (item + 1) * at_once); ++i)
+            if (m_nodes[i].second == 0)
+                gather_tip(basis, moments, m_nodes[i], sums_of(i));
     });
     for (std::size_t node = m_nodes.size(); node-- > 0;)
         if (m_nodes[node].second != 0)
@@ -273,16 +305,18 @@ bool SurfaceTree::place(Node& node, std::span<const Part> parts)
     return true;
 }
 
-void SurfaceTree::gather_leaf(const SurfaceBasis& basis, const std::vector<float>& moments, Node& node, float* sums)
+void SurfaceTree::gather_tip(const SurfaceBasis& basis, const std::vector<float>& moments, Node& node, float* sums)
 {
     const auto samples = std::span(m_order).subspan(node.begin, node.end - node.begin);
-    std::array<Part, leaf_size> parts;
+    std::array<Part, tip_size> parts;
     for (std::size_t k = 0; k < samples.size(); ++k)
         parts[k] = {m_weights[samples[k]], m_samples[samples[k]].position, m_samples[samples[k]].normal};
     if (!place(node, std::span(parts).first(samples.size())))
         return;
     PairSource& cluster = node.cluster;
     float square = 0.0f;
+    float bend = 0.0f;
+    cluster.squares.fill(0.0f);
     for (const std::uint32_t i : samples) {
         if (m_weights[i] == 0.0f)
             continue;
@@ -290,10 +324,18 @@ void SurfaceTree::gather_leaf(const SurfaceBasis& basis, const std::vector<float
         const Vec3f offset = sample.position - cluster.position;
         square += m_weights[i] * (glm::dot(offset, offset) + sample.area * sample_spread);
         node.light_radius = std::max(node.light_radius, glm::length(offset));
+        bend += m_weights[i] * glm::dot(offset, sample.normal);
+        add_squares(offset, m_weights[i] / node.weight, cluster.squares);
+        // A disk has as much along each line of its plane.
+        const float of_disk = 0.5f * sample_spread * sample.area * m_weights[i] / node.weight;
+        for (std::size_t axis = 0; axis < 3; ++axis)
+            cluster.squares[axis] += of_disk;
+        add_squares(sample.normal, -of_disk, cluster.squares);
         add_turned(basis, turn(cluster, sample.as_source(0, 0)), sample.area, moments.data() + i * basis.moments(),
                    sums);
     }
     cluster.spread = 0.25f * square / node.weight;
+    cluster.bend = bend / node.weight;
 }
 
 void SurfaceTree::gather_children(const SurfaceBasis& basis, const std::vector<float>& moments, Node& node, float* sums)
@@ -308,6 +350,8 @@ void SurfaceTree::gather_children(const SurfaceBasis& basis, const std::vector<f
         return;
     PairSource& cluster = node.cluster;
     float spread = 0.0f;
+    float bend = 0.0f;
+    cluster.squares.fill(0.0f);
     for (const std::size_t number : children) {
         const Node& child = m_nodes[number];
         if (child.weight == 0.0f)
@@ -315,10 +359,16 @@ void SurfaceTree::gather_children(const SurfaceBasis& basis, const std::vector<f
         const Vec3f offset = child.cluster.position - cluster.position;
         spread += child.weight * (child.cluster.spread + 0.25f * glm::dot(offset, offset));
         node.light_radius = std::max(node.light_radius, glm::length(offset) + child.light_radius);
+        bend += child.weight * (child.cluster.bend + glm::dot(offset, child.cluster.normal));
+        const float part = child.weight / node.weight;
+        add_squares(offset, part, cluster.squares);
+        for (std::size_t k = 0; k < cluster.squares.size(); ++k)
+            cluster.squares[k] += part * child.cluster.squares[k];
         add_turned(basis, turn(cluster, child.cluster), 1.0f,
                    moments.data() + (m_samples.size() + number) * basis.moments(), sums);
     }
     cluster.spread = spread / node.weight;
+    cluster.bend = bend / node.weight;
 }
 
 void SurfaceTree::add_near(const Node& node, std::vector<PairSource>& near) const

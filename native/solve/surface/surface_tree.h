@@ -95,8 +95,8 @@ private:
     static bool place(Node& node, std::span<const Part> parts);
     static bool is_far(const Node& node, float distance, const Opening& opening);
     void weigh(const SurfaceBasis& basis, const PairTables& tables, const std::vector<float>& moments);
-    std::uint32_t build(std::size_t begin, std::size_t end);
-    void gather_leaf(const SurfaceBasis& basis, const std::vector<float>& moments, Node& node, float* sums);
+    std::uint32_t build(std::size_t begin, std::size_t end, bool is_in_leaf);
+    void gather_tip(const SurfaceBasis& basis, const std::vector<float>& moments, Node& node, float* sums);
     void gather_children(const SurfaceBasis& basis, const std::vector<float>& moments, Node& node, float* sums);
     void add_near(const Node& node, std::vector<PairSource>& near) const;
 
