@@ -6,6 +6,7 @@ There are none if the package is registered without being an enabled add-on, as 
 from __future__ import annotations
 
 import functools
+import re
 from pathlib import Path
 
 import bpy
@@ -94,14 +95,32 @@ def _use_cache_folder(chosen, _context) -> None:
     library.choose_cache_folder(bpy.path.abspath(chosen.cache_folder) if chosen.cache_folder else "")
 
 
+LABELS = {
+    "clorox": "Bleach",
+    "gatorade": "Sports Drink",
+    "head_and_shoulders_shampoo": "Shampoo, Pearly",
+    "shampoo": "Shampoo, Clear",
+    "skin1": "Skin, Darker",
+    "skin2": "Skin, Lighter",
+    "spectralon": "White Reference (Spectralon)",
+}
+"""Labels of presets whose names are trademarks, or tell artists little."""
+
+
+def _label(name: str) -> str:
+    """Label of a preset."""
+    words = re.sub(r"(?<=[a-z])(?=\d)", " ", name).replace("_", " ")
+    return LABELS.get(name, words.title())
+
+
 def preset_items() -> list[tuple]:
     """Measured materials as items of an enum."""
     # Files hold the number, which is the row in the table: new materials go to its end.
     items = [
-        (name, name.replace("_", " ").title(), material.source, number)
+        (name, _label(name), f"Measured by {material.source.partition(',')[0]}", number)
         for number, (name, material) in enumerate(presets().items(), start=1)
     ]
-    return [(CUSTOM_PRESET, "Custom", "Values set by hand", 0), *sorted(items)]
+    return [(CUSTOM_PRESET, "Custom", "Values set by hand", 0), *sorted(items, key=lambda item: item[1])]
 
 
 class BeamspreadPreferences(bpy.types.AddonPreferences):

@@ -170,3 +170,14 @@ def test_labels_in_the_source_are_not_british():
             if is_text and " " in node.value and BRITISH.search(node.value):
                 found.append(f"{file.name}:{node.lineno}: {node.value}")
     assert not found
+
+
+def test_presets_have_plain_names_and_say_who_measured_them():
+    items = BeamspreadNode.bl_rna.properties["preset"].enum_items[1:]
+    labels = [item.name for item in items]
+    assert len(set(labels)) == len(labels) == len(beamspread.presets())
+    assert not [label for label in labels if re.search(r"[a-z]\d|Clorox|Gatorade|Head", label)]
+    assert {item.description for item in items} == {
+        "Measured by Jensen et al. 2001",
+        "Measured by Narasimhan et al. 2006",
+    }
