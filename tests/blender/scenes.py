@@ -230,6 +230,20 @@ def file_image(path, width=16, height=16, value=0.0, **options):
     return bpy.data.images.load(str(path))
 
 
+def tile_file(folder, number, name="Tiles"):
+    return folder / f"{name}.{number}.exr"
+
+
+def tiled_image(folder, sizes, name="Tiles", value=0.0):
+    """An image of UDIM tiles, whose sizes are given by number, in EXR files of this value."""
+    for number, (width, height) in sizes.items():
+        texels = np.full((height, width, 3), value, np.float32)
+        native.write_exr(str(tile_file(folder, number, name)), texels, ["R", "G", "B"])
+    image = bpy.data.images.load(str(tile_file(folder, min(sizes), name)))
+    image.source = "TILED"
+    return image
+
+
 def run_batch(*arguments):
     """Report of a batch of the open file, in this process."""
     return bake_all(batch_options.parse([*map(str, arguments)]))

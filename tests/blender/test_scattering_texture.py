@@ -7,8 +7,8 @@ from beamspread import Medium, albedo_from_color, library, luminance
 from beamspread.blender.jobs.state import state
 from beamspread.core.ldf.reflectance_table import reflectance_table
 from beamspread.core.material import Material
-from scenes import add_material, add_mesh, add_plane, add_sun, bake, node_of
-from test_udim import read, tile_file, tiled_image
+from beamspread.core.native import native
+from scenes import add_material, add_mesh, add_plane, add_sun, bake, node_of, tile_file, tiled_image
 
 SIZE, SIDE, ANGLE = 48, 2.0, 30
 PATH = SIDE / SIZE
@@ -194,7 +194,11 @@ def test_a_mesh_that_bends_has_its_texture_in_tiles(tmp_path):
                 loop.uv[0] *= 2
         texels = bake(obj)[0].copy()
         assert not any("multiplies light" in line for line in state.lines())
-        tiles = [read(tile_file(tmp_path, number)) for number in (1001, 1002)] if name == "Tiles" else [texels]
+        tiles = (
+            [native.read_exr(str(tile_file(tmp_path, number)))[0] for number in (1001, 1002)]
+            if name == "Tiles"
+            else [texels]
+        )
         found[name] = np.concatenate(tiles, axis=1)[..., :3]
         bpy.data.objects.remove(obj)
     assert found["Tiles"].shape == found["Whole"].shape

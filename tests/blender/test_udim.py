@@ -25,18 +25,9 @@ def light(tmp_path):
     scenes.add_world((0.2, 0.2, 0.2, 1))
 
 
-def tile_file(folder, number, name="Tiles"):
-    return folder / f"{name}.{number}.exr"
-
-
 def tiled_image(folder, sizes=None, name="Tiles", value=0.0):
     """An image of tiles of different sizes, in EXR files of this value."""
-    for number, (width, height) in (sizes or SIZES).items():
-        texels = np.full((height, width, 3), value, np.float32)
-        native.write_exr(str(tile_file(folder, number, name)), texels, ["R", "G", "B"])
-    image = bpy.data.images.load(str(tile_file(folder, min(sizes or SIZES), name)))
-    image.source = "TILED"
-    return image
+    return scenes.tiled_image(folder, sizes or SIZES, name, value)
 
 
 def read(path):
@@ -81,7 +72,7 @@ def test_each_tile_equals_its_plane_alone(tmp_path):
     quads = four_planes(tiled_image(tmp_path))
     scenes.select(quads)
     assert bpy.ops.beamspread.bake() == {"FINISHED"}
-    tiles = {number: read(tile_file(tmp_path, number)) for number in SIZES}
+    tiles = {number: read(scenes.tile_file(tmp_path, number)) for number in SIZES}
     brightest = max(texels.max() for texels in tiles.values())
     bpy.data.objects.remove(quads)
     for place, (number, size) in enumerate(SIZES.items()):
@@ -103,7 +94,7 @@ def test_light_crosses_the_tiles_of_one_plane(second, tmp_path):
     whole = bpy.data.images.new("Whole", 128, 64, float_buffer=True, alpha=False)
     material = scenes.add_material("Whole", image=whole, mean_free_path=(0.2,) * 3)
     expected = scenes.bake(add_quads(halves, [((0, 0), (0.5, 1)), ((0.5, 0), (0.5, 1))], material, "Whole"))[0]
-    left, right = read(tile_file(tmp_path, 1001)), read(tile_file(tmp_path, 1012))
+    left, right = read(scenes.tile_file(tmp_path, 1001)), read(scenes.tile_file(tmp_path, 1012))
     if second == (64, 64):
         np.testing.assert_allclose(np.hstack([left, right]), expected, atol=1e-3 * expected.max())
         return
@@ -140,7 +131,7 @@ def test_a_new_image_has_the_tiles_that_are_used_and_a_render_shows_them(tmp_pat
         x, y = np.rint(middle).astype(int)
         half = np.multiply(0.08 / np.multiply(size, [1, 1]), extent) * 64
         u, v = (np.array(uv) % 1 + np.multiply(extent, 0.5)) * 64
-        texels = read(tile_file(tmp_path, number, "Quads_Medium"))
+        texels = read(scenes.tile_file(tmp_path, number, "Quads_Medium"))
         rows, columns = (slice(*np.rint([at - d, at + d]).astype(int)) for at, d in ((v, half[1]), (u, half[0])))
         expected = texels[rows, columns].mean(axis=(0, 1))
         assert expected.min() > 0
@@ -191,9 +182,9 @@ def test_lost_packed_and_unsaved_tiles_are_named(tmp_path):
     assert "has UDIM tiles that were never saved. Save it with <UDIM> in its name" in failed(quads)
     missing = tiled_image(tmp_path, name="Missing")
     scenes.node_of(quads.data.materials[0]).image = missing
-    tile_file(tmp_path, 1002, "Missing").unlink()
+    scenes.tile_file(tmp_path, 1002, "Missing").unlink()
     missing.buffers_free()
-    assert f"has lost its file {tile_file(tmp_path, 1002, 'Missing')}" in failed(quads)
+    assert f"has lost its file {scenes.tile_file(tmp_path, 1002, 'Missing')}" in failed(quads)
     bpy.context.scene.beamspread.use_udim, bpy.context.scene.beamspread.image_dir = True, "//textures"
     scenes.node_of(quads.data.materials[0]).image = None
     assert "UDIM tiles are files beside the .blend file, which was never saved. Save it first" in failed(quads)
@@ -208,12 +199,12 @@ def test_a_new_tiled_image_of_blender_gets_files(tmp_path):
     assert bpy.ops.beamspread.bake() == {"FINISHED"}
     numbers = [*SIZES][:2] + [1005] + [*SIZES][2:]
     assert sorted(tile.number for tile in image.tiles) == sorted(numbers)
-    assert {read(tile_file(tmp_path, number, "Blender_s")).shape for number in SIZES} == {(20, 24, 3)}
-    assert all(read(tile_file(tmp_path, number, "Blender_s")).any() for number in SIZES)
-    before = read(tile_file(tmp_path, 1001, "Blender_s"))
+    assert {read(scenes.tile_file(tmp_path, number, "Blender_s")).shape for number in SIZES} == {(20, 24, 3)}
+    assert all(read(scenes.tile_file(tmp_path, number, "Blender_s")).any() for number in SIZES)
+    before = read(scenes.tile_file(tmp_path, 1001, "Blender_s"))
     scenes.select(quads)
     assert bpy.ops.beamspread.bake() == {"FINISHED"}
-    np.testing.assert_array_equal(read(tile_file(tmp_path, 1001, "Blender_s")), before)
+    np.testing.assert_array_equal(read(scenes.tile_file(tmp_path, 1001, "Blender_s")), before)
 
 
 def test_a_failure_leaves_all_files(tmp_path, monkeypatch):
@@ -246,10 +237,10 @@ def test_objects_share_tiles(tmp_path):
     second = add_quads([((0.2, -1), 0.8)], [((0.55, 0.55), 0.4)], scenes.add_material("Other", image=image), "Second")
     scenes.select(first)
     assert bpy.ops.beamspread.bake() == {"FINISHED"}
-    before = {number: read(tile_file(tmp_path, number)) for number in (1001, 1002)}
+    before = {number: read(scenes.tile_file(tmp_path, number)) for number in (1001, 1002)}
     scenes.select(second)
     assert bpy.ops.beamspread.bake() == {"FINISHED"}
-    after = {number: read(tile_file(tmp_path, number)) for number in (1001, 1002)}
+    after = {number: read(scenes.tile_file(tmp_path, number)) for number in (1001, 1002)}
     np.testing.assert_array_equal(after[1002], before[1002])
     np.testing.assert_array_equal(after[1001][:32, :32], before[1001][:32, :32])
     assert before[1001][36:60, 36:60].max() == 0
@@ -270,7 +261,7 @@ def test_objects_of_one_material_share_a_new_image(tmp_path):
     image = scenes.image_of(first)
     sizes = {tile.number: tuple(tile.size) for tile in image.tiles}
     assert sizes == {1001: (2048, 2048), 1002: (512, 512)}
-    texels = read(tile_file(tmp_path, 1001, "First_Medium"))
+    texels = read(scenes.tile_file(tmp_path, 1001, "First_Medium"))
     assert texels[100:700, 100:700].min() > 0
     assert texels[1100:1700, 1100:1700].min() > 0
     assert state.lines() == []
@@ -284,7 +275,7 @@ def test_a_tiled_bake_is_up_to_date_until_something_changes(tmp_path):
     stale.refresh(bpy.context)
     (row,) = state.rows.values()
     assert (row.status, row.messages) == (Status.BAKED, ())
-    tile_file(tmp_path, 1011).unlink()
+    scenes.tile_file(tmp_path, 1011).unlink()
     scenes.reopen(tmp_path)
     stale.refresh(bpy.context)
     (row,) = state.rows.values()
@@ -320,7 +311,7 @@ def test_irradiance_has_tiles_of_its_own(tmp_path):
     for _ in range(2):
         scenes.select(quads)
         assert bpy.ops.beamspread.bake() == {"FINISHED"}
-    assert not read(tile_file(tmp_path, 1001)).any()
+    assert not read(scenes.tile_file(tmp_path, 1001)).any()
     files = sorted(path.name for path in tmp_path.glob("*Irradiance*"))
     assert files == [f"Tiles.1001.exr_Irradiance.{number}.exr" for number in SIZES]
     assert all(read(tmp_path / name).any() for name in files)
@@ -342,14 +333,14 @@ def test_a_batch_writes_tiles_and_lists_them(tmp_path):
         assert entry["files"] == [str(out / f"Quads_Medium_{frame:04d}.{number}.exr") for number in SIZES]
         assert (entry["width"], entry["height"]) == (24, 24)
         assert [read(file).shape for file in entry["files"]] == [(24, 24, 3)] * 2 + [(24, 19, 3), (24, 24, 3)]
-    assert not read(tile_file(tmp_path, 1001)).any()
+    assert not read(scenes.tile_file(tmp_path, 1001)).any()
     (out / "Quads_Medium_0003.1011.exr").unlink()
     done = subprocess.run([*command, "--resume"], capture_output=True, text=True)
     assert done.returncode == 0, done.stderr
     assert [entry["status"] for entry in json.loads(report.read_text())["bakes"]] == ["skipped", "written"]
     done = subprocess.run(scenes.batch_command(tmp_path / "scene.blend"), capture_output=True, text=True)
     assert done.returncode == 0, done.stderr
-    assert all(read(tile_file(tmp_path, number)).any() for number in SIZES)
+    assert all(read(scenes.tile_file(tmp_path, number)).any() for number in SIZES)
 
 
 def test_live_and_blenders_bake_say_that_they_have_no_tiles(tmp_path):
@@ -396,7 +387,7 @@ def test_colors_come_from_the_uvs_of_each_tile(by_cycles, tmp_path):
     plane = add_quads([((-1, 0), 1), ((0, 0), 1)], [((0, 0), 1), ((1, 0), 1)], material)
     scenes.select(plane)
     assert bpy.ops.beamspread.bake() == {"FINISHED"}
-    row = np.concatenate([read(tile_file(tmp_path, number))[32, :, 0] for number in (1001, 1002)])
+    row = np.concatenate([read(scenes.tile_file(tmp_path, number))[32, :, 0] for number in (1001, 1002)])
     ramp = np.polyfit(np.arange(8, 120), row[8:120], 1)
     assert np.abs(np.polyval(ramp, np.arange(8, 120)) - row[8:120]).max() < 0.02 * row.max()
     assert ramp[1] == pytest.approx(0, abs=0.02 * row.max())
