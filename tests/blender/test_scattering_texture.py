@@ -194,11 +194,8 @@ def test_a_mesh_that_bends_has_its_texture_in_tiles(tmp_path):
                 loop.uv[0] *= 2
         texels = bake(obj)[0].copy()
         assert not any("multiplies light" in line for line in state.lines())
-        tiles = (
-            [native.read_exr(str(tile_file(tmp_path, number)))[0] for number in (1001, 1002)]
-            if name == "Tiles"
-            else [texels]
-        )
+        files = [tile_file(tmp_path, number) for number in (1001, 1002)]
+        tiles = [native.read_exr(str(path))[0] for path in files] if name == "Tiles" else [texels]
         found[name] = np.concatenate(tiles, axis=1)[..., :3]
         bpy.data.objects.remove(obj)
     assert found["Tiles"].shape == found["Whole"].shape

@@ -29,7 +29,7 @@ HALO = 1.5
 MAX_ANGLES = 4
 """Largest number of angles from the normal. More: light turns less on surfaces that bend, and more noise."""
 
-SHARP, FINEST = 0.85, 0.4
+SHARP, FINEST = 0.85, 0.6
 """Texel of planes over a mean free path, and least one over that of the surface. Smaller: sharper textures, longer."""
 
 MAX_ROW = 1 << 16

@@ -21,7 +21,7 @@ from .spreading import Spreading
 from .textured import Convention, TexturedPlane, continued
 
 # Texels along a side of mirror images in which paths are followed. More: slower; fewer: less light beyond long paths.
-MIRRORED_TEXELS = 64
+MIRRORED_TEXELS = 128
 
 
 def why_multiplied(settings: BakeSettings) -> str:
@@ -96,8 +96,7 @@ def corrected(side: str, grid: AnyGrid, luminance: NDArray, spreading: Spreading
 
 def _mirrored_texels(grid: AnyGrid) -> tuple[int, int]:
     """Rows and columns of mirror images beyond each border."""
-    pitches, sizes = (grid.pitch_y, grid.pitch_x), (grid.height, grid.width)
-    return tuple(min(int(grid.mirrored / pitch), MIRRORED_TEXELS, size) for pitch, size in zip(pitches, sizes))
+    return tuple(min(int(grid.mirrored / pitch), MIRRORED_TEXELS) for pitch in (grid.pitch_y, grid.pitch_x))
 
 
 def _mirrored(values: NDArray, pad: tuple[int, int]) -> NDArray:
@@ -114,9 +113,10 @@ def _mirrored_beams(beams: Beams, pad: tuple[int, int]) -> Beams:
     mirrored = []
     for light, way in beams:
         whole = _mirrored(light, pad)
-        height, width, _ = whole.shape
-        is_below = (np.arange(height) < rows) | (np.arange(height) >= height - rows)
-        is_beside = (np.arange(width) < columns) | (np.arange(width) >= width - columns)
+        is_below, is_beside = (
+            (np.arange(-pad, size + pad) // size % 2).astype(bool)
+            for pad, size in zip((rows, columns), light.shape[:2])
+        )
         for flips_x in (False, True):
             for flips_y in (False, True):
                 there = (is_below == flips_y)[:, None] & (is_beside == flips_x)
