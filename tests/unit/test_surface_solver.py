@@ -427,7 +427,7 @@ def test_a_ball_returns_as_much_light_as_its_library(name, bound):
 def test_tables_are_kept_for_their_medium_alone():
     """Those of a library are not taken for its copy with curvatures, at whatever address; a pair on a ball tells them.
 
-    A second field takes a fiftieth of the time; a third leaves room for a busy machine.
+    A second field takes a fiftieth of the time, one of larger samples a tenth; a third leaves room for a busy machine.
     """
     flat = library(Medium(0.8, 1.0), "preview")
     bend, chord = 1 / 30, 3.0
@@ -436,7 +436,7 @@ def test_tables_are_kept_for_their_medium_alone():
     for row, angle, x in zip(samples, (-half, half), (0, chord)):
         row[:] = (x, 0, 0, np.sin(angle), 0, np.cos(angle), np.cos(angle), 0, -np.sin(angle), 1.44)
 
-    def solved(ldf):
+    def solved(ldf, samples=samples):
         start = time.process_time()
         field = _native_test.SurfaceField(samples, [ldf] * 3, list(ALBEDO), [1.0] * 3)
         seconds = time.process_time() - start
@@ -451,6 +451,8 @@ def test_tables_are_kept_for_their_medium_alone():
     assert np.array_equal(again, ball)
     assert np.array_equal(solved(flat)[0], plane)
     assert second < first / 3
+    _, larger = solved(curved, samples * np.float32([1] * 9 + [1.06]))
+    assert larger < first / 3
 
 
 def test_the_bench_runs_in_small():

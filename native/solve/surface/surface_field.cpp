@@ -43,6 +43,9 @@ constexpr float least_own = 0.25f;
 // Largest difference of the squared length of a unit vector from 1, and of the cosine of two vectors from 0.
 constexpr float unit_tolerance = 2e-3f;
 
+// Sizes of texels per octave for which kernels are made. More: fewer functions, less that surfaces share.
+constexpr double texels_per_octave = 2.0;
+
 // Fraction of a sample's luminance by pairs that bend more than the tables, from which it counts as beyond them.
 constexpr float beyond_fraction = 0.5f;
 
@@ -101,13 +104,20 @@ SampleAreas areas_of(std::span<const SurfaceSample> samples)
     return {least->area, most->area, static_cast<float>(sum / static_cast<double>(samples.size()))};
 }
 
+// A length of which kernels are made: surfaces of about the same texels share them. It is at most the length itself, so
+// that functions are enough.
+double rounded_down(double length)
+{
+    return std::exp2(std::floor(std::log2(length) * texels_per_octave) / texels_per_octave);
+}
+
 std::shared_ptr<SurfaceKernels> checked_kernels(const SurfaceProblem& problem)
 {
     std::shared_ptr<SurfaceKernels> kernels;
     with_threads(problem.threads, [&] {
         check(problem);
         kernels = SurfaceKernels::recent({problem.channels, problem.max_angle_deg,
-                                          std::sqrt(static_cast<double>(areas_of(problem.samples).mean)),
+                                          rounded_down(std::sqrt(static_cast<double>(areas_of(problem.samples).mean))),
                                           problem.is_colored, problem.tolerance});
     });
     return kernels;
