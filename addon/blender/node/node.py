@@ -461,8 +461,18 @@ def _remove_class() -> None:
         bpy.utils.unregister_class(BeamspreadNode)
 
 
+def _name_class() -> None:
+    """Have F1 find the node's properties: Blender looks for their class here, where it puts no node classes."""
+    setattr(bpy.types, BeamspreadNode.bl_idname, BeamspreadNode)
+
+
+def _forget_name() -> None:
+    delattr(bpy.types, BeamspreadNode.bl_idname)
+
+
 register, unregister = all_or_nothing(
     (_add_class, _remove_class),
+    (_name_class, _forget_name),
     *handlers(load_post=upgrade_nodes, save_pre=release_unused_trees),
     (_watch_unit_scale, _end_watch),
     *handlers(load_post=_watch_unit_scale, undo_post=keep_names_of_presets, redo_post=keep_names_of_presets),
