@@ -70,7 +70,7 @@ class Record:
     def changed(self, now: dict[str, str]) -> list[str]:
         """Names of the parts whose digest differs. Parts that the record lacks count as unchanged.
 
-        The first word of a part is its digest; the others tell what it consists of, and earlier versions lack them.
+        The first word of a part is its digest. More words are digests of single objects; earlier versions lack them.
         """
         return [name for name, part in now.items() if self.parts.get(name, part).split(" ")[0] != part.split(" ")[0]]
 

@@ -156,7 +156,7 @@ class _SceneFacts:
         return bool(((self._centers - halves < low - edge) | (self._centers + halves > high + edge)).any())
 
     def _around(self, target: BakeTarget, grid: Grid | None) -> Surroundings:
-        """What a target sees, above its grid if it is flat: by rays that Blender traces, or boxes in large scenes."""
+        """Surroundings of a target: by rays that Blender traces, or by boxes in large scenes."""
         if self.triangles <= MAX_TRACED and len(self._boxes) <= MAX_TRACED_OBJECTS:
             side = 1.0 if target.side == FRONT else -1.0
             around = traced_around(self._depsgraph, target.obj, side, self.lights)

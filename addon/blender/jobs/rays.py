@@ -1,4 +1,4 @@
-"""Rays that Blender traces among the evaluated objects: what an object sees, before anything is read for a bake."""
+"""Rays that Blender traces among the evaluated objects, before anything is read for a bake."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ FAR = 1e9
 
 
 def traced_around(depsgraph, obj, side: float, lights: Sequence[Light]) -> Surroundings:
-    """What the faces of an object see of other faces, and of lamps; `side`: -1 for the faces' backs, else 1."""
+    """Surroundings of the faces of an object; `side`: -1 for the faces' backs, else 1."""
     places, normals = _places_on(obj.evaluated_get(depsgraph), side)
     if not len(places):
         return Surroundings()

@@ -37,7 +37,7 @@ class Finders:
     world : True if Cycles renders the world.
     lamps : number of lamps whose light Cycles finds.
     colors : True if Cycles evaluates the base color.
-    around : what the receiver sees, which decides how long our own rays take.
+    around : surroundings of the receiver, which decide how long bounced light takes.
     """
 
     bounced: bool = False

@@ -1,4 +1,4 @@
-"""What surrounds a receiver, and how long our own rays take to find the light that bounces there."""
+"""Surroundings of a receiver, and the time in which bounced light is found there."""
 
 from __future__ import annotations
 
@@ -44,7 +44,7 @@ LIFT = 1e-3
 
 @dataclass(frozen=True)
 class Surroundings:
-    """What a receiver sees.
+    """How open a receiver is to its surroundings.
 
     Attributes
     ----------

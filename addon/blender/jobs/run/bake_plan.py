@@ -107,7 +107,7 @@ class BakePlan:
         return Forecast(name, grids, *facts, is_bent=self.mesh.is_bent)
 
     def _around(self, grids: list[AnyGrid], light: Illumination, has_unknown_sky: bool) -> Surroundings:
-        """What the receiver sees; by boxes around objects where it would take long to trace them here."""
+        """Surroundings of the receiver; by boxes around objects where rays would keep the window waiting."""
         if light.triangle_count <= MAX_TRACED:
             return surroundings_of(grids, light, has_unknown_sky)
         return Surroundings(max(map(self.by_cycles.enclosed_part, grids)))
