@@ -58,7 +58,7 @@ LIT_BY_LAMPS = 0.5
 # Seconds per texel of light in a texture's albedos; lamps take three times as long as a sun, which this is between.
 TEXTURED = 4e-6
 # The same on surfaces that bend, in any case, and by the root of the number of texels.
-BENT_TEXTURED, BENT_TEXTURED_ROOT = 2.5, 0.033
+BENT_TEXTURED, BENT_TEXTURED_ROOT = 3.5, 0.05
 
 # Seconds of the simulation of an angle in final quality, in half-spaces; and in slabs up to a thickness in mean free
 # paths, with whose root it grows beyond.
