@@ -31,6 +31,7 @@ KINDS = {
     "paper_page": ["PointLight", "WorldLight"],
     "paper_shade": ["PointLight", "WorldLight"],
     "veined_slab": ["SunLight", "SunLight"],
+    "quail_egg": ["AreaLight", "WorldLight"],
 }
 PARTS = {"soap_bar": 1, "plank_floor": 35, "acrylic_letters": 6}
 
