@@ -35,8 +35,8 @@ SHARP, FINEST = 0.85, 0.6
 MAX_ROW = 1 << 16
 """Most texels in a row of a receiver."""
 
-MAX_TEXELS = 1 << 20
-"""Most texels of all planes together; if there are more, they become larger. Larger: more memory."""
+MAX_RATIO = 4
+"""Most texels of all planes over those at which light is gathered; if more, they become larger. Larger: more memory."""
 
 ONE_AZIMUTH = 90.0
 """Degrees within which azimuths count as one: planes turn with the light. Larger: less noise, and light that turns."""
@@ -57,7 +57,7 @@ def ratio_on_planes(
     pitch *= float(np.clip(SHARP * min(material.mean_free_path) / pitch, FINEST, 1))
     light = PointsLight(grid, target, spreading)
     middles = [light.aligned(middle) for middle in middles_of(points, CORE * halo)]
-    planes = _planes(middles, points, pitch, halo)
+    planes = _planes(middles, points, pitch, halo, MAX_RATIO * effort.texels**2)
     texels = Points(*(values[shown] for values in (grid.middles, grid.normals, grid.tangents)))
     image = PlanesImage(*side_by_side(planes), texels, _gap(grid))
     means = _means(len(texels), len(points))
@@ -80,13 +80,13 @@ def ratio_on_planes(
     return ratios
 
 
-def _planes(middles: Sequence[Middle], points: Points, pitch: float, halo: float) -> list[TangentPlane]:
-    """Planes of texels of a pitch, or of larger ones if these are too many."""
+def _planes(middles: Sequence[Middle], points: Points, pitch: float, halo: float, most: int) -> list[TangentPlane]:
+    """Planes of texels of a pitch, or of larger ones if these are more than `most`."""
     planes = [TangentPlane.of(middle, points, pitch, halo) for middle in middles]
     texels = sum(width * height for width, height in (plane.size for plane in planes))
-    if texels <= MAX_TEXELS:
+    if texels <= most:
         return planes
-    pitch *= float(np.sqrt(texels / MAX_TEXELS))
+    pitch *= float(np.sqrt(texels / most))
     return [TangentPlane.of(middle, points, pitch, halo) for middle in middles]
 
 
