@@ -355,7 +355,9 @@ BouncedLight trace_bounced_light(std::span<const NodeGrid> grids, std::span<cons
             const std::size_t done = tracer.samples();
             const std::size_t count =
                 std::min({std::max<std::size_t>(done, 1), wanted - done, max_round, block - done % block});
-            const double work = left * static_cast<double>(count) / static_cast<double>(wanted - done);
+            // Until the noise is known, there may be as many samples as are allowed.
+            const std::size_t planned = done < 2 ? std::max(most, wanted) : wanted;
+            const double work = left * static_cast<double>(count) / static_cast<double>(planned - done);
             for (std::size_t half = 0; half < 2; ++half)
                 tracer.trace(half, count, progress, 0.5 * work);
             left -= work;
