@@ -273,15 +273,15 @@ def test_the_tree_keeps_the_tolerance_where_paths_are_many_texels(texels, monkey
     assert relative_error(bodies.Run(ldf, light, texels).luminance, truth) < bodies.TOLERANCE
 
 
-@pytest.mark.parametrize(("name", "texels", "most"), [("plane", 1, 210), ("plane", 4, 270), ("ball", 4, 700)])
-def test_a_sample_has_few_sources(name, texels, most, monkeypatch):
-    """Clusters keep the tolerance from nearby, as their second moments count: 178, 205 and 408 samples and clusters for
-    each sample. Planes have 230 to 530 with a sign of the second derivatives wrong, the ball 1086 without `bend`.
+@pytest.mark.parametrize(("texels", "most"), [(1, 225), (4, 280)])
+def test_a_sample_has_few_sources(texels, most, monkeypatch):
+    """Clusters keep the tolerance from nearby, as their second moments count: 201 and 241 samples and clusters for each
+    sample, 230 to 530 with a sign of the second derivatives wrong.
     """
     monkeypatch.syspath_prepend(BENCH)
     bodies = importlib.import_module("bodies")
     ldf = library(Medium(0.8, 1.4), "preview").with_curved([-0.05, 0.05, 0.1, 0.2], (0.0, 30.0, 60.0, 80.0, 88.5), 4000)
-    run = bodies.Run(ldf, bodies.under_lamp(getattr(bodies, name), 10_000), texels)
+    run = bodies.Run(ldf, bodies.under_lamp(bodies.plane, 10_000), texels)
     assert run.sources < most
 
 

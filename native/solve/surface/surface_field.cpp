@@ -25,9 +25,9 @@ constexpr std::size_t leaves_at_once = 16;
 // Bounds on the error of a far cluster's light over the tolerance that are tried, from the largest on, each half of the
 // one before. The first one is taken whose probed samples differ from those with a quarter of it by less than a fraction
 // of the tolerance: errors of other samples are larger. Larger fraction: fewer pairs, larger errors.
-constexpr double most_share = 1024.0;
-constexpr std::size_t shares = 24;
-constexpr double probed_fraction = 0.25;
+constexpr double most_share = 64.0;
+constexpr std::size_t shares = 20;
+constexpr double probed_fraction = 0.2;
 
 // Leaves of which samples are probed: the brightest and others. More: errors closer to the tolerance, more time.
 constexpr std::size_t bright_probes = 8;
