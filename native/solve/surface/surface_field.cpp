@@ -104,11 +104,10 @@ SampleAreas areas_of(std::span<const SurfaceSample> samples)
     return {least->area, most->area, static_cast<float>(sum / static_cast<double>(samples.size()))};
 }
 
-// A length of which kernels are made: surfaces of about the same texels share them. It is at most the length itself, so
-// that functions are enough.
-double rounded_down(double length)
+// A length near to another one, of which kernels are made: surfaces of about the same texels share them.
+double rounded(double length)
 {
-    return std::exp2(std::floor(std::log2(length) * texels_per_octave) / texels_per_octave);
+    return std::exp2(std::round(std::log2(length) * texels_per_octave) / texels_per_octave);
 }
 
 std::shared_ptr<SurfaceKernels> checked_kernels(const SurfaceProblem& problem)
@@ -117,7 +116,7 @@ std::shared_ptr<SurfaceKernels> checked_kernels(const SurfaceProblem& problem)
     with_threads(problem.threads, [&] {
         check(problem);
         kernels = SurfaceKernels::recent({problem.channels, problem.max_angle_deg,
-                                          rounded_down(std::sqrt(static_cast<double>(areas_of(problem.samples).mean))),
+                                          rounded(std::sqrt(static_cast<double>(areas_of(problem.samples).mean))),
                                           problem.is_colored, problem.tolerance});
     });
     return kernels;
