@@ -27,6 +27,14 @@ constexpr double max_stretch = 1.3;
 constexpr double short_in_paths = 0.1;
 constexpr std::size_t max_pieces = 64;
 
+// Progress in the units of field_bake.h: a ray to a light with a size, a mean of open and of dim places; tables of the
+// medium, of all samples together; the solution of a sample where light goes as far as samples lie apart, and the power
+// by which it grows with that distance. Larger: a bar that slows down less there.
+constexpr double bent_ray_work = 0.25;
+constexpr double tables_work = 1e6;
+constexpr double pairs_work = 40.0;
+constexpr double reach_power = 0.6;
+
 // Coverage that smaller ones count as: rounding decides about their areas.
 constexpr float least_coverage = 1e-3f;
 
@@ -146,6 +154,30 @@ std::vector<double> survey(const Surface& surface, const std::vector<const Surfa
     return means;
 }
 
+// Number of rays from each texel to a light that brings this share of all light.
+int rays_of(const BakeOptions& options, double share)
+{
+    return std::max(options.min_rays, static_cast<int>(std::nearbyint(options.rays * share)));
+}
+
+double gather_work(const SurfaceLight& light, int rays)
+{
+    return light_work + (!light.field && light.has_size() ? bent_ray_work * rays : 0.0);
+}
+
+// Work of the solution of all samples, relative to their number.
+double pair_work(const Samples& samples, const std::vector<ChannelMedium>& channels)
+{
+    double area = 0.0;
+    for (const SurfaceSample& sample : samples.all)
+        area += static_cast<double>(sample.area);
+    double longest = 0.0;
+    for (const ChannelMedium& channel : channels)
+        longest = std::max(longest, channel.mean_free_path);
+    const double distance = std::sqrt(area / static_cast<double>(samples.all.size()));
+    return distance > 0.0 ? pairs_work * std::pow(longest / distance, reach_power) : solver_work;
+}
+
 // True if the light of all channels is not proportional.
 bool is_colored(const Surface& surface, const std::vector<const SurfaceLight*>& lights)
 {
@@ -177,9 +209,17 @@ double bake_bent(const Surface& surface, const std::vector<const SurfaceLight*>&
         progress.finish();
         return 0.0;
     }
-    progress.set_total(light_work * static_cast<double>(lights.size()) + 2.0 * solver_work);
     const std::vector<double> means = survey(surface, lights, options);
     const double all = std::accumulate(means.begin(), means.end(), 0.0);
+    std::vector<int> rays;
+    std::vector<double> works;
+    for (std::size_t i = 0; i < lights.size(); ++i) {
+        rays.push_back(rays_of(options, all > 0.0 ? means[i] / all : 0.0));
+        works.push_back(gather_work(*lights[i], rays.back()));
+    }
+    const double tables = tables_work / static_cast<double>(samples.all.size());
+    const double pairs = pair_work(samples, channels);
+    progress.set_total(std::accumulate(works.begin(), works.end(), tables + pairs));
     const SurfaceProblem problem{.samples = samples.all,
                                  .steps = samples.steps,
                                  .whole_areas = samples.whole_areas,
@@ -190,16 +230,14 @@ double bake_bent(const Surface& surface, const std::vector<const SurfaceLight*>&
                                  .max_moment_bytes = options.max_moment_bytes,
                                  .is_direct = options.solver == Solver::direct};
     std::unique_ptr<SurfaceField> field;
-    progress.advance_by(solver_work, [&](Progress& part) { field = std::make_unique<SurfaceField>(problem, part); });
+    progress.advance_by(tables, [&](Progress& part) { field = std::make_unique<SurfaceField>(problem, part); });
     for (std::size_t i = 0; i < lights.size(); ++i)
-        progress.advance_by(light_work, [&](Progress& part) {
-            const double share = all > 0.0 ? means[i] / all : 0.0;
-            const int rays = std::max(options.min_rays, static_cast<int>(std::nearbyint(options.rays * share)));
+        progress.advance_by(works[i], [&](Progress& part) {
             SampleSink sink(samples, lights[i]->color, *field);
-            lights[i]->gather(surface, options.ray_settings(rays), sink, part);
+            lights[i]->gather(surface, options.ray_settings(rays[i]), sink, part);
         });
     std::vector<float> values(samples.all.size() * channels.size());
-    progress.advance_by(solver_work, [&](Progress& part) { field->solve(part, values.data()); });
+    progress.advance_by(pairs, [&](Progress& part) { field->solve(part, values.data()); });
     // The luminance of a texel is the mean of its pieces.
     const std::size_t count = channels.size();
     for (std::size_t i = 0; i < surface.samples(); ++i) {
