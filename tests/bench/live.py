@@ -12,6 +12,7 @@ import shutil
 import subprocess
 import tempfile
 import time
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -20,12 +21,15 @@ from beamspread.core.bake.bake_settings import BakeSettings
 from beamspread.core.bake.surface import Surface
 from beamspread.core.live.library_service import LibraryService
 from beamspread.core.live.live_target import LiveTarget
-from beamspread.core.live.renderer import LiveRenderer, for_live
+from beamspread.core.live.renderer import SIDES, LiveRenderer, for_live
 from beamspread.core.material import Material
+from beamspread.core.scene.flat_mesh import flatten
 from beamspread.core.scene.illumination import Illumination
 from beamspread.core.scene.lights import PointLight, SunLight
 from beamspread.core.scene.occluders import Mesh
 from beamspread.core.scene.polygons import Polygons
+from beamspread.core.scene.receiver import build_receiver
+from beamspread.core.scene.texture import BaseColor, Texture, TextureUse
 from beamspread.core.target import Target
 
 INSIDE = Path(__file__).resolve().parent / "in_blender" / "live.py"
@@ -58,6 +62,15 @@ def in_window(resolution):
             print(f"  {name:28} {numbers}  {row.get('texels', '')}")
 
 
+def veined(target, resolution):
+    """The target with veins in whose albedos light scatters."""
+    x = np.linspace(0, 1, resolution)
+    veins = 0.5 + 0.5 * np.sin(40 * x + 6 * np.sin(9 * x[:, None]))
+    colors = np.stack([0.35 + 0.5 * veins, 0.3 + 0.5 * veins, 0.2 + 0.5 * veins], -1).astype(np.float32)
+    texture = Texture(build_receiver(flatten(FLOOR), resolution, resolution), (colors,), TextureUse())
+    return replace(target, texture=texture, surface=target.surface.colored(BaseColor(texture)))
+
+
 def beside_bakes(resolution):
     print("quick renderings beside bakes: sum of all errors over the sum, worst texel over the brightest, seconds")
     for ior in (1.4, 1.0):
@@ -66,17 +79,22 @@ def beside_bakes(resolution):
             material = Material(albedo=(0.99, 0.9, 0.6), mean_free_path=(0.02,) * 3, anisotropy=0.8, ior=ior)
             rest = Illumination([light], CARD), Surface(material), for_live(BakeSettings())
             target = LiveTarget(Target("Floor"), FLOOR, (resolution, resolution), resolution, *rest)
-            renderer = LiveRenderer(LibraryService())
-            exact = renderer.exact(target).texture
-            for side in (512, 256, 128, 64):
-                renderer.quick(target, side)
-                start, cpu = time.perf_counter(), time.process_time()
-                quick = renderer.quick(target, side).texture
-                seconds = time.perf_counter() - start, time.process_time() - cpu
-                error = np.abs(quick - exact)
-                total, worst = (error.sum((0, 1)) / exact.sum((0, 1))).max(), (error / exact.max((0, 1))).max()
-                row = f"{total:8.2%} {worst:8.2%} {seconds[0]:7.3f} wall {seconds[1]:7.3f} CPU"
-                print(f"  ior {ior}, {name:18} {side:4d}: {row}")
+            for change, kind in ((lambda target, _: target, ""), (veined, ", veins")):
+                print_errors(f"ior {ior}, {name}{kind}", change(target, resolution), (256, 128) if kind else SIDES)
+
+
+def print_errors(name, target, sides):
+    renderer = LiveRenderer(LibraryService())
+    exact = renderer.exact(target).texture
+    for side in sorted(sides, reverse=True):
+        renderer.quick(target, side)
+        start, cpu = time.perf_counter(), time.process_time()
+        quick = renderer.quick(target, side).texture
+        seconds = time.perf_counter() - start, time.process_time() - cpu
+        error = np.abs(quick - exact)
+        total, worst = (error.sum((0, 1)) / exact.sum((0, 1))).max(), (error / exact.max((0, 1))).max()
+        row = f"{total:8.2%} {worst:8.2%} {seconds[0]:7.3f} wall {seconds[1]:7.3f} CPU"
+        print(f"  {name:35} {side:4d}: {row}")
 
 
 def main():

@@ -262,6 +262,7 @@ def test_quick_renderings_show_how_light_scatters_in_a_texture(renderer):
     quick, exact, other = renderer.quick(scattered, 48), renderer.exact(scattered), renderer.exact(multiplied)
     job = BakeJob("Floor", texture.on(receiver), scattered.illumination, surface, scattered.settings, BAKE_STEPS)
     np.testing.assert_allclose(exact.texture, job.run().texture, rtol=1e-4, atol=1e-6)
+    assert renderer.quick_side(scattered) <= 128 < renderer.quick_side(plain)  # paths take longer
     mean = exact.texture.mean()
     assert quick.texture.mean() == pytest.approx(mean, rel=0.02)
     assert np.abs(quick.texture - exact.texture).mean() < 0.5 * np.abs(other.texture - exact.texture).mean()

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import lru_cache
 
 import numpy as np
 
@@ -44,6 +45,9 @@ TRANSFORM_COST, SIZED_LIGHT_COST = 8, 20
 
 MAX_QUICK_COST = 24 * 256**2
 """Budget of a quick rendering in texels times their costs, about .08 s of CPU time; more is finer and slower."""
+
+SCATTERED_SIDE = 128
+"""Most texels along the longer side of a quick rendering in whose texture light scatters; more is finer and slower."""
 
 QUICK_RAYS = 4
 """Rays from each texel of a quick rendering to a light with a size; more has less noise and is slower."""
@@ -112,7 +116,8 @@ class LiveRenderer:
     def quick_side(self, target: LiveTarget) -> int:
         """Texels along the longer side of a quick rendering of the target; few where that takes longer."""
         is_slow = self._mesh(target).is_bent or has_back(target.surface.thickness, target.settings)
-        return SIDES[0] if is_slow else quick_side(target.illumination.lights)
+        side = SIDES[0] if is_slow else quick_side(target.illumination.lights)
+        return min(side, SCATTERED_SIDE) if is_scattered(target) else side
 
     def quick(self, target: LiveTarget, side: int, progress: Progress | None = None) -> Rendering:
         """Render at most `side` texels along the longer side, interpolated to the size of the image.
@@ -196,7 +201,7 @@ class LiveRenderer:
         material = surface.material
         if surface.base_color is not None:
             pairs = zip(surface.base_color, sources)
-            albedo = tuple(albedo_from_reflectance(color, source.diffuse_reflectance) for color, source in pairs)
+            albedo = tuple(_albedo(color, source) for color, source in pairs)
             material = replace(material, albedo=albedo)
         if settings.distributions != "library":
             sources = [load_source(settings.sample_folder, settings.distributions)] * 3
@@ -292,6 +297,12 @@ class LiveRenderer:
             framed = FramedReceiver(receiver, settings.margin)
             keep_recent(self._receivers, key, (framed, mesh, target.texture), MAX_RECEIVERS)
         return self._receivers[key][0]
+
+
+@lru_cache(maxsize=32)
+def _albedo(color: float, source) -> float:
+    """Albedo of a color, which takes longer to find than a quick rendering may."""
+    return albedo_from_reflectance(color, source.diffuse_reflectance)
 
 
 def _media(target: LiveTarget) -> list:

@@ -6,10 +6,6 @@ namespace beamspread {
 
 namespace {
 
-// Sublattices along each axis. More: texels of the same paths, and of the same errors, are farther apart, and more paths
-// are drawn.
-constexpr std::size_t sublattices_along_axis = 8;
-
 std::ptrdiff_t floor_div(std::ptrdiff_t value, std::ptrdiff_t divisor)
 {
     return value >= 0 ? value / divisor : -((-value + divisor - 1) / divisor);
@@ -17,8 +13,8 @@ std::ptrdiff_t floor_div(std::ptrdiff_t value, std::ptrdiff_t divisor)
 
 }  // namespace
 
-Sublattices::Sublattices(std::size_t width, std::size_t height, std::size_t reach)
-    : m_width(width), m_height(height), m_side(sublattices_along_axis)
+Sublattices::Sublattices(std::size_t width, std::size_t height, std::size_t side, std::size_t reach)
+    : m_width(width), m_height(height), m_side(side)
 {
     m_rows = (height + m_side - 1) / m_side;
     m_runs = ((width + m_side - 1) / m_side + texels_per_run - 1) / texels_per_run;

@@ -13,8 +13,9 @@ namespace beamspread {
 
 class Sublattices {
 public:
-    // `reach`: largest offset of a place, texels; farther ones count as at the same distance along each axis.
-    Sublattices(std::size_t width, std::size_t height, std::size_t reach);
+    // `side`: sublattices along each axis. `reach`: largest offset of a place, texels; farther ones count as at the same
+    // distance along each axis.
+    Sublattices(std::size_t width, std::size_t height, std::size_t side, std::size_t reach);
 
     std::size_t width() const { return m_width; }
     std::size_t height() const { return m_height; }

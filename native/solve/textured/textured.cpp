@@ -36,8 +36,15 @@ constexpr double survival_power = 1.5;
 // Largest probability to survive a scattering. Nearer to 1: longer paths in textures of little absorption.
 constexpr double max_survival = 0.9999;
 
-// Walks that show how far paths go, of all lights together. Fewer: the reach is less certain.
-constexpr std::size_t reach_walks = 4096;
+// Walks that show how far paths go, of all lights together; and sublattices along each axis. Fewer: the reach is less
+// certain, and texels of the same paths, and of the same errors, are nearer to each other.
+struct Fineness {
+    std::size_t reach_walks;
+    std::size_t side;
+};
+constexpr Fineness fine = {4096, 8};
+// The same where texels have one unit of walks at most: to draw paths takes longer than to follow them.
+constexpr Fineness coarse = {512, 4};
 
 // Stream of random numbers of the paths.
 constexpr std::uint64_t path_stream = 0x7e87;
@@ -74,13 +81,13 @@ std::vector<std::size_t> shares_of(const std::vector<TexturedLight>& lights)
 }
 
 // Distance that all but a few paths stay within, texels.
-std::size_t reach_of(const std::vector<PathPlan>& plans, std::uint64_t seed)
+std::size_t reach_of(const std::vector<PathPlan>& plans, std::size_t walks, std::uint64_t seed)
 {
     std::vector<std::int32_t> farthest;
     for (std::size_t i = 0; i < plans.size(); ++i) {
         SharedPaths paths;
         Random random(seed, path_stream, ~static_cast<std::uint64_t>(i));
-        add_paths(paths, plans[i], (reach_walks + plans.size() - 1) / plans.size(), random);
+        add_paths(paths, plans[i], (walks + plans.size() - 1) / plans.size(), random);
         for (std::size_t p = 0; p < paths.size(); ++p) {
             std::int32_t most = 0;
             for (std::size_t k = paths.first[p]; k < paths.first[p + 1]; ++k)
@@ -97,13 +104,14 @@ std::size_t reach_of(const std::vector<PathPlan>& plans, std::uint64_t seed)
 
 class Textured {
 public:
-    explicit Textured(const TexturedProblem& problem)
+    Textured(const TexturedProblem& problem, const Fineness& fineness)
         : m_problem(problem),
           m_survival(std::clamp(std::pow(static_cast<double>(largest(problem.albedo)), survival_power),
                                 problem.mean_albedo, max_survival)),
           m_plans(plans_of(problem, m_survival)),
           m_pairs(shares_of(problem.lights)),
-          m_sublattices(problem.albedo.width, problem.albedo.height, reach_of(m_plans, problem.seed)),
+          m_sublattices(problem.albedo.width, problem.albedo.height, fineness.side,
+                        reach_of(m_plans, fineness.reach_walks, problem.seed)),
           m_albedo(m_sublattices.dealt(problem.albedo, static_cast<float>(1.0 / m_survival), true)),
           m_entering(m_sublattices.dealt(problem.factor, 1.0f, false))
     {
@@ -241,7 +249,7 @@ TexturedError solve_textured(const TexturedProblem& problem, Progress& progress,
     TexturedError result;
     std::vector<float> ratio;
     with_threads(problem.threads, [&] {
-        Textured textured(problem);
+        Textured textured(problem, problem.max_walks > unit ? fine : coarse);
         std::size_t units = std::clamp<std::size_t>(problem.max_walks / unit, 1, first_units);
         double left = 1.0;
         while (true) {
