@@ -50,6 +50,29 @@ def test_the_estimated_error_is_the_error():
         assert 0.6 * actual < error < 1.6 * actual
 
 
+def test_light_that_hardly_follows_the_factor_has_little_noise():
+    """Dark stripes in a bright medium, in which light spreads farther than they are wide: it leaves them nearly as bright
+    as around them. With the factor of light that leaves as it is, the error of as many paths is 4.7 %."""
+    bright, dark, border = 0.99993, 0.91, 0.9958  # colors of .82, .07 and .44
+    number = np.arange(128)
+    albedo = np.where(number // 21 % 2 == 0, bright, dark)
+    albedo[np.flatnonzero(np.diff(number // 21 % 2)) + 1] = border
+    errors = []
+    result = convolve(
+        np.ones((128, 128)),
+        (0, 0, -1),
+        library(Medium(0.8, 1.5)),
+        np.broadcast_to(albedo, (128, 128)).astype(np.float32),
+        2.0,
+        1.0,
+        report_noise=errors.append,
+    )
+    assert errors[0] < 0.03
+    # No line stands out at a border: light falls from the middle of a bright stripe to that of a dark one.
+    profile = result.mean(axis=0)[52:74]
+    assert (np.diff(profile) < 0.02 * profile.max()).all()
+
+
 def test_more_noise_is_allowed_and_reported():
     errors = []
     for noise in (0.06, 0.02):

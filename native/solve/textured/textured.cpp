@@ -1,9 +1,14 @@
 #include "solve/textured/textured.h"
 
 #include <algorithm>
+#include <array>
 #include <atomic>
 #include <cmath>
 #include <functional>
+#include <limits>
+#include <numeric>
+#include <optional>
+#include <span>
 #include <string>
 #include <utility>
 
@@ -45,6 +50,14 @@ struct Fineness {
 constexpr Fineness fine = {4096, 8};
 // The same where texels have one unit of walks at most: to draw paths takes longer than to follow them.
 constexpr Fineness coarse = {512, 4};
+
+// Powers of the factor of light that leaves, of which the one with the smallest error is taken: 1 if light spreads less
+// than the texture changes, 0 if it spreads so far that it leaves dark texels as bright as others. More: slower choice.
+constexpr std::array<float, 5> leaving_powers = {1.0f, 0.75f, 0.5f, 0.25f, 0.0f};
+
+// Rows by which they are chosen, in strips of this height. More: slower, and surer if parts of a texture differ.
+constexpr std::size_t choice_rows = 256;
+constexpr std::size_t strip_rows = 64;
 
 // Stream of random numbers of the paths.
 constexpr std::uint64_t path_stream = 0x7e87;
@@ -161,15 +174,62 @@ public:
     double products() const { return m_products; }
 
     // Writes the ratio of each texel; returns the estimated error.
-    double ratio(std::vector<float>& ratio) const
+    double ratio(std::vector<float>& ratio)
     {
-        std::vector<float> scale(texels());
-        for (std::size_t y = 0; y < m_problem.albedo.height; ++y)
-            copy_row(m_problem.convention, y, 0, m_problem.albedo.width, scale.data() + y * m_problem.albedo.width);
-        return smooth_ratio(m_sums, scale, m_problem.albedo.width, m_problem.albedo.height, ratio);
+        std::vector<std::size_t> rows(m_problem.albedo.height);
+        std::iota(rows.begin(), rows.end(), std::size_t{0});
+        if (!m_leaving_power) {
+            const std::vector<std::size_t> few = strips(m_problem.albedo.height);
+            double least = std::numeric_limits<double>::infinity();
+            for (const float power : leaving_powers) {
+                const double error = ratio_of(few, power, ratio);
+                if (error < least) {
+                    least = error;
+                    m_leaving_power = power;
+                }
+            }
+        }
+        return ratio_of(rows, m_leaving_power.value_or(1.0f), ratio);
     }
 
 private:
+    static std::vector<std::size_t> strips(std::size_t height)
+    {
+        const std::size_t step = std::max<std::size_t>((height + choice_rows - 1) / choice_rows, 1);
+        std::vector<std::size_t> rows;
+        for (std::size_t y = 0; y < height; ++y)
+            if (y / strip_rows % step == 0)
+                rows.push_back(y);
+        return rows;
+    }
+
+    // The ratio at some rows. What is smoothed is the light that leaves over this power of its factor: a sharp factor times
+    // a smooth ratio would draw lines along borders where light hardly follows the factor.
+    double ratio_of(std::span<const std::size_t> rows, float power, std::vector<float>& ratio) const
+    {
+        const std::size_t width = m_problem.albedo.width;
+        std::vector<float> scale(rows.size() * width), factor(scale.size());
+        PathSums sums;
+        for (std::size_t h = 0; h < 2; ++h) {
+            sums.textured[h].resize(scale.size());
+            sums.plain[h].resize(scale.size());
+        }
+        parallel_for(rows.size(), [&](std::size_t row) {
+            for (std::size_t x = 0; x < width; ++x) {
+                const std::size_t to = row * width + x, from = rows[row] * width + x;
+                factor[to] = std::pow(m_problem.factor(rows[row], x), 1.0f - power);
+                scale[to] = m_problem.convention(rows[row], x) / factor[to];
+                for (std::size_t h = 0; h < 2; ++h) {
+                    sums.textured[h][to] = m_sums.textured[h][from] * factor[to];
+                    sums.plain[h][to] = m_sums.plain[h][from];
+                }
+            }
+        });
+        const double error = smooth_ratio(sums, scale, width, rows.size(), ratio);
+        std::ranges::transform(ratio, factor, ratio.begin(), std::divides<>());
+        return error;
+    }
+
     static std::vector<PathPlan> plans_of(const TexturedProblem& problem, double survival)
     {
         std::vector<PathPlan> plans;
@@ -214,6 +274,7 @@ private:
     AlignedVector<float> m_entering;  // the convention's factor of light that enters
     std::vector<AlignedVector<float>> m_light;
     PathSums m_sums;
+    std::optional<float> m_leaving_power;  // see `leaving_powers`; of the first round
     std::uint64_t m_rounds = 0;
     double m_products = 0.0;
 };
