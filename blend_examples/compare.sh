@@ -43,6 +43,9 @@ beside veined_slab "$pictures/veined_slab.png" "Beamspread: light scatters in th
 render quail_egg with_convention.py "$pictures/quail_egg_by_convention.png"
 beside quail_egg "$pictures/quail_egg.png" "Beamspread: light scatters in the speckles" \
     "$pictures/quail_egg_by_convention.png" "As renderers do: light, times the texture"
+render inlay with_convention.py "$pictures/inlay_by_convention.png"
+beside inlay "$pictures/inlay.png" "Beamspread: light scatters in both stones" \
+    "$pictures/inlay_by_convention.png" "As renderers do: light, times the texture"
 
 for scene in round_soap jade_bowl marble_head paper_page paper_shade; do
     render "$scene" with_paths.py "$pictures/${scene}_by_paths.png" 128

@@ -17,6 +17,7 @@ sys.path[:0] = [str(HERE), str(HERE.parent / "build" / "stage")]
 
 import acrylic_letters  # noqa: E402
 import beamspread  # noqa: E402
+import inlay  # noqa: E402
 import jade_bowl  # noqa: E402
 import low_sun  # noqa: E402
 import marble_floor  # noqa: E402
@@ -97,6 +98,7 @@ def main():
     beamspread.register()
     scenes = {
         "acrylic_letters": acrylic_letters.build,
+        "inlay": inlay.build,
         "jade_bowl": jade_bowl.build,
         "laser_beams": laser_beams,
         "obstacle": obstacle,

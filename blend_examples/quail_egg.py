@@ -6,7 +6,6 @@ light goes round into its shade. A texture that multiplies light keeps every spe
 
 import math
 
-import bpy
 import numpy as np
 import scene_parts as parts
 
@@ -23,9 +22,7 @@ def build():
     wax, node = parts.medium_material(
         "Wax", color_mode="BASE_COLOR", mean_free_path=(0.25 * MM,) * 3, anisotropy=0.8, ior=1.4
     )
-    texture = wax.node_tree.nodes.new("ShaderNodeTexImage")
-    texture.image, texture.location = speckles(), (-320, 0)
-    wax.node_tree.links.new(texture.outputs["Color"], node.inputs["Base Color"])
+    parts.paint(wax, node, "Speckles", speckles())
     egg(wax)
     cloth = parts.plain_material("Cloth", (0.055, 0.07, 0.075), roughness=0.9)
     parts.box("Table", (-0.3, -0.3, -0.02), (0.3, 0.3, 0.0), cloth)
@@ -87,9 +84,4 @@ def speckles():
     coarse = spots(middles / np.linalg.norm(middles, axis=1, keepdims=True), generator.uniform(0.03, 0.085, 34 * 7))
     ground, pale, dark = np.array([0.80, 0.72, 0.56]), np.array([0.34, 0.24, 0.15]), np.array([0.10, 0.055, 0.035])
     color = ground + fine[..., None] * (pale - ground)
-    color = color + coarse[..., None] * (dark - color)
-    encoded = np.where(color < 0.0031308, 12.92 * color, 1.055 * color ** (1 / 2.4) - 0.055)  # sRGB
-    image = bpy.data.images.new("Speckles", columns, rows)
-    image.pixels.foreach_set(np.dstack([encoded, np.ones((rows, columns))]).astype(np.float32).ravel())
-    image.pack()
-    return image
+    return color + coarse[..., None] * (dark - color)

@@ -73,6 +73,17 @@ def medium_material(name, **properties):
     return material, node
 
 
+def paint(material, node, name, color):
+    """Link an image of colors, linear RGB (rows upward, columns, 3), to the base color of a material's node."""
+    encoded = np.where(color < 0.0031308, 12.92 * color, 1.055 * color ** (1 / 2.4) - 0.055)  # sRGB
+    image = bpy.data.images.new(name, *color.shape[1::-1])
+    image.pixels.foreach_set(np.dstack([encoded, np.ones(color.shape[:2])]).astype(np.float32).ravel())
+    image.pack()
+    texture = material.node_tree.nodes.new("ShaderNodeTexImage")
+    texture.image, texture.location = image, (-320, 0)
+    material.node_tree.links.new(texture.outputs["Color"], node.inputs["Base Color"])
+
+
 def plain_material(name, color, roughness=0.5, metallic=0.0, specular=0.5):
     material, output = empty_material(name)
     bsdf = material.node_tree.nodes.new("ShaderNodeBsdfPrincipled")

@@ -4,7 +4,6 @@ Light from the stone around a thin vein passes through it and washes it out; wid
 neighborhood. A texture that multiplies light keeps every vein.
 """
 
-import bpy
 import numpy as np
 import scene_parts as parts
 
@@ -21,9 +20,7 @@ def build():
     onyx, node = parts.medium_material(
         "Onyx", color_mode="BASE_COLOR", mean_free_path=(0.4 * MM,) * 3, anisotropy=0.8, ior=1.5
     )
-    texture = onyx.node_tree.nodes.new("ShaderNodeTexImage")
-    texture.image, texture.location = veins(), (-320, 0)
-    onyx.node_tree.links.new(texture.outputs["Color"], node.inputs["Base Color"])
+    parts.paint(onyx, node, "Onyx", veins())
     parts.plane("Slab", WIDTH, DEPTH, onyx)
     surroundings()
     parts.sun("Low sun", parts.direction(66, -24), 6.5, (1.0, 0.88, 0.72))
@@ -52,12 +49,7 @@ def veins():
     thin = 0.7 * np.exp(-((waves(1.5, 9) / 0.09) ** 2))
     light, warm, dark = np.array([0.84, 0.80, 0.71]), np.array([0.80, 0.67, 0.42]), np.array([0.23, 0.10, 0.04])
     part = np.maximum(thick, thin)[..., None]
-    color = (1 - part) * (warm + (light - warm) * bands[..., None]) + part * dark
-    encoded = np.where(color < 0.0031308, 12.92 * color, 1.055 * color ** (1 / 2.4) - 0.055)  # sRGB
-    image = bpy.data.images.new("Onyx", columns, rows)
-    image.pixels.foreach_set(np.dstack([encoded, np.ones((rows, columns))]).astype(np.float32).ravel())
-    image.pack()
-    return image
+    return (1 - part) * (warm + (light - warm) * bands[..., None]) + part * dark
 
 
 def surroundings():

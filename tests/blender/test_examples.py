@@ -32,6 +32,7 @@ KINDS = {
     "paper_shade": ["PointLight", "WorldLight"],
     "veined_slab": ["SunLight", "SunLight"],
     "quail_egg": ["AreaLight", "WorldLight"],
+    "inlay": ["PointLight", "SunLight"],
 }
 PARTS = {"soap_bar": 1, "plank_floor": 35, "acrylic_letters": 6}
 
