@@ -51,8 +51,9 @@ def test_the_estimated_error_is_the_error():
 
 
 def test_light_that_hardly_follows_the_factor_has_little_noise():
-    """Dark stripes in a bright medium, in which light spreads farther than they are wide: it leaves them nearly as bright
-    as around them. With the factor of light that leaves as it is, the error of as many paths is 4.7 %."""
+    """Dark stripes in a bright medium, in which light spreads farther than they are wide: it leaves them nearly as
+    bright as around them. With the factor of light that leaves as it is, the error of as many paths is 4.7 %.
+    """
     bright, dark, border = 0.99993, 0.91, 0.9958  # colors of .82, .07 and .44
     number = np.arange(128)
     albedo = np.where(number // 21 % 2 == 0, bright, dark)
