@@ -18,6 +18,10 @@ function(python_module target tag folder)
   target_link_libraries(${target} PRIVATE ${beamspread_libraries})
   target_include_directories(${target} SYSTEM PRIVATE ${ARGN})
   target_compile_definitions(${target} PRIVATE BEAMSPREAD_VERSION="${PROJECT_VERSION}")
+  # Bindings convert arguments and call the libraries: small code counts, since a package has it for each Python.
+  if(NOT MSVC)
+    target_compile_options(${target} PRIVATE $<$<CONFIG:Release>:-Os>)
+  endif()
   set_target_properties(${target} PROPERTIES PREFIX "" OUTPUT_NAME _native SUFFIX .${tag}
                         LIBRARY_OUTPUT_DIRECTORY ${folder})
   # Reading headers takes most of the compilation. (The preset `dev` compiles each file by itself, for clang-tidy.)
