@@ -61,7 +61,10 @@ def ends(number, seconds=20.0):
 
 
 def folders(parent):
-    return [folder for folder in Path(tempfile.gettempdir()).glob(f"{PREFIX}{parent}-*") if folder not in earlier]
+    """New folders of Cycles' process, among the temporary files of this process or of those that tests start."""
+    places = {tempfile.gettempdir(), os.environ["TMPDIR"]}
+    found = (folder for place in places for folder in Path(place).glob(f"{PREFIX}{parent}-*"))
+    return [folder for folder in found if folder not in earlier]
 
 
 def new_copy():
