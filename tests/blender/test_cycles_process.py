@@ -211,12 +211,14 @@ def test_an_orphan_ends_and_removes_all(is_stopped):
     """While it renders: its parent is killed."""
     program = [bpy.app.binary_path, "-b", "--factory-startup", "--python"] if bpy.app.binary_path else [sys.executable]
     with subprocess.Popen([*program, str(PARENT), "--", str(STAGE)], stdout=subprocess.PIPE, text=True) as parent:
-        line = next(line for line in parent.stdout if line.startswith("renders"))
-        number = int(line.split()[1])
-        assert folders(parent.pid)
-        if is_stopped:
-            os.kill(number, signal.SIGSTOP)
-        parent.kill()
+        try:
+            line = next(line for line in parent.stdout if line.startswith("renders"))
+            number = int(line.split()[1])
+            assert folders(parent.pid)
+            if is_stopped:
+                os.kill(number, signal.SIGSTOP)
+        finally:
+            parent.kill()
     assert ends(number)
     assert not folders(parent.pid)
 
