@@ -18,6 +18,9 @@ using Map = std::vector<float>;
 // Standard deviations of the Gaussians that a ratio may be smoothed by, texels.
 constexpr std::array<double, 4> widths{0.0, 1.0, 2.0, 4.0};
 
+// The one by which factors are compared.
+constexpr double compared_width = 2.0;
+
 // Texels along a side of the blocks that each choose a width. Larger: fewer wrong choices, and widths that follow the map
 // less closely.
 constexpr std::size_t block_side = 4;
@@ -222,6 +225,14 @@ double smooth_ratio(const PathSums& sums, const std::vector<float>& scale, std::
     });
     const double mean = std::accumulate(row_sums.begin(), row_sums.end(), 0.0) / static_cast<double>(width * height);
     return mean > 0.0 ? std::sqrt(error / static_cast<double>(blocks.count())) / mean : 0.0;
+}
+
+
+double cost_of_smoothing(const PathSums& sums, const std::vector<float>& scale, std::size_t width, std::size_t height)
+{
+    const Ratios fine = ratios_of(sums, 0.0, width, height);
+    const Errors errors = errors_of(ratios_of(sums, compared_width, width, height), fine.half, scale, width, height);
+    return std::accumulate(errors.cost.begin(), errors.cost.end(), 0.0) / static_cast<double>(errors.cost.size());
 }
 
 }  // namespace beamspread

@@ -7,7 +7,6 @@
 #include <functional>
 #include <limits>
 #include <numeric>
-#include <optional>
 #include <span>
 #include <string>
 #include <utility>
@@ -173,23 +172,32 @@ public:
     // Scatterings of all texels in the walks so far.
     double products() const { return m_products; }
 
-    // Writes the ratio of each texel; returns the estimated error.
-    double ratio(std::vector<float>& ratio)
+    // Writes the ratio of each texel, with a power of the factor of light that leaves; returns the estimated error.
+    double ratio(float power, std::vector<float>& ratio) const
     {
         std::vector<std::size_t> rows(m_problem.albedo.height);
         std::iota(rows.begin(), rows.end(), std::size_t{0});
-        if (!m_leaving_power) {
-            const std::vector<std::size_t> few = strips(m_problem.albedo.height);
-            double least = std::numeric_limits<double>::infinity();
-            for (const float power : leaving_powers) {
-                const double error = ratio_of(few, power, ratio);
-                if (error < least) {
-                    least = error;
-                    m_leaving_power = power;
-                }
+        const Leaving leaving(*this, rows, power);
+        const double error = smooth_ratio(leaving.sums, leaving.scale, m_problem.albedo.width, rows.size(), ratio);
+        std::ranges::transform(ratio, leaving.factor, ratio.begin(), std::divides<>());
+        return error;
+    }
+
+    // The power by which a Gaussian leaves the smallest error.
+    float best_power() const
+    {
+        const std::vector<std::size_t> few = strips(m_problem.albedo.height);
+        double least = std::numeric_limits<double>::infinity();
+        float best = 1.0f;
+        for (const float power : leaving_powers) {
+            const Leaving leaving(*this, few, power);
+            const double cost = cost_of_smoothing(leaving.sums, leaving.scale, m_problem.albedo.width, few.size());
+            if (cost < least) {
+                least = cost;
+                best = power;
             }
         }
-        return ratio_of(rows, m_leaving_power.value_or(1.0f), ratio);
+        return best;
     }
 
 private:
@@ -203,32 +211,34 @@ private:
         return rows;
     }
 
-    // The ratio at some rows. What is smoothed is the light that leaves over this power of its factor: a sharp factor times
-    // a smooth ratio would draw lines along borders where light hardly follows the factor.
-    double ratio_of(std::span<const std::size_t> rows, float power, std::vector<float>& ratio) const
-    {
-        const std::size_t width = m_problem.albedo.width;
-        std::vector<float> scale(rows.size() * width), factor(scale.size());
-        PathSums sums;
-        for (std::size_t h = 0; h < 2; ++h) {
-            sums.textured[h].resize(scale.size());
-            sums.plain[h].resize(scale.size());
-        }
-        parallel_for(rows.size(), [&](std::size_t row) {
-            for (std::size_t x = 0; x < width; ++x) {
-                const std::size_t to = row * width + x, from = rows[row] * width + x;
-                factor[to] = std::pow(m_problem.factor(rows[row], x), 1.0f - power);
-                scale[to] = m_problem.convention(rows[row], x) / factor[to];
-                for (std::size_t h = 0; h < 2; ++h) {
-                    sums.textured[h][to] = m_sums.textured[h][from] * factor[to];
-                    sums.plain[h][to] = m_sums.plain[h][from];
-                }
+    // Sums and scale at some rows, as they are smoothed: the light that leaves over a power of its factor. A sharp factor
+    // times a smooth ratio would draw lines along borders where light hardly follows the factor.
+    struct Leaving {
+        Leaving(const Textured& all, std::span<const std::size_t> rows, float power)
+            : scale(rows.size() * all.m_problem.albedo.width), factor(scale.size())
+        {
+            const std::size_t width = all.m_problem.albedo.width;
+            for (std::size_t h = 0; h < 2; ++h) {
+                sums.textured[h].resize(scale.size());
+                sums.plain[h].resize(scale.size());
             }
-        });
-        const double error = smooth_ratio(sums, scale, width, rows.size(), ratio);
-        std::ranges::transform(ratio, factor, ratio.begin(), std::divides<>());
-        return error;
-    }
+            parallel_for(rows.size(), [&](std::size_t row) {
+                for (std::size_t x = 0; x < width; ++x) {
+                    const std::size_t to = row * width + x, from = rows[row] * width + x;
+                    factor[to] = std::pow(all.m_problem.factor(rows[row], x), 1.0f - power);
+                    scale[to] = all.m_problem.convention(rows[row], x) / factor[to];
+                    for (std::size_t h = 0; h < 2; ++h) {
+                        sums.textured[h][to] = all.m_sums.textured[h][from] * factor[to];
+                        sums.plain[h][to] = all.m_sums.plain[h][from];
+                    }
+                }
+            });
+        }
+
+        PathSums sums;
+        std::vector<float> scale;
+        std::vector<float> factor;  // over the power of itself
+    };
 
     static std::vector<PathPlan> plans_of(const TexturedProblem& problem, double survival)
     {
@@ -274,7 +284,6 @@ private:
     AlignedVector<float> m_entering;  // the convention's factor of light that enters
     std::vector<AlignedVector<float>> m_light;
     PathSums m_sums;
-    std::optional<float> m_leaving_power;  // see `leaving_powers`; of the first round
     std::uint64_t m_rounds = 0;
     double m_products = 0.0;
 };
@@ -319,7 +328,7 @@ TexturedError solve_textured(const TexturedProblem& problem, Progress& progress,
             left -= share;
             textured.add(units, [&](double part) { progress.advance(share * part); });
             result.walks += units * unit;
-            result.error = textured.ratio(ratio);
+            result.error = textured.ratio(1.0f, ratio);
             const auto walks = static_cast<double>(result.walks);
             const double wanted = walks * std::pow(result.error / problem.tolerance, 2);
             const double affordable = std::min(static_cast<double>(problem.max_walks),
@@ -330,6 +339,10 @@ TexturedError solve_textured(const TexturedProblem& problem, Progress& progress,
                 break;
             units = std::min(static_cast<std::size_t>(more), max_growth * (result.walks / unit));
         }
+        // While more paths may follow the factor stays as it is: few paths do not show what another one blurs.
+        if (result.error > problem.tolerance)
+            if (const float power = textured.best_power(); power != 1.0f)
+                result.error = textured.ratio(power, ratio);
     });
     progress.finish();
     for (std::size_t y = 0; y < problem.albedo.height; ++y) {
