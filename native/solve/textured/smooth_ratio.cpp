@@ -227,7 +227,6 @@ double smooth_ratio(const PathSums& sums, const std::vector<float>& scale, std::
     return mean > 0.0 ? std::sqrt(error / static_cast<double>(blocks.count())) / mean : 0.0;
 }
 
-
 double cost_of_smoothing(const PathSums& sums, const std::vector<float>& scale, std::size_t width, std::size_t height)
 {
     const Ratios fine = ratios_of(sums, 0.0, width, height);

@@ -18,7 +18,6 @@ struct PathSums {
 double smooth_ratio(const PathSums& sums, const std::vector<float>& scale, std::size_t width, std::size_t height,
                     std::vector<float>& ratio);
 
-
 // Estimated mean squared error of ratio x scale if all texels are smoothed by one Gaussian: without choices, which favor
 // errors that are too low by chance.
 double cost_of_smoothing(const PathSums& sums, const std::vector<float>& scale, std::size_t width, std::size_t height);
