@@ -2,6 +2,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <cstdint>
 #include <memory>
 #include <string>
 #include <utility>
@@ -172,6 +173,9 @@ void bind_surface(py::module_& m)
             "clear", [](HeldField& self) { self.field().clear(); }, "Remove all rays.")
         .def("solve", &HeldField::solve, py::arg("progress") = py::none(), "Luminance, float32 (N, channels).")
         .def_property_readonly("beyond_share", [](HeldField& self) { return self.field().beyond_share(); })
+        .def_property_readonly(
+            "kernels", [](HeldField& self) { return reinterpret_cast<std::uintptr_t>(&self.field().basis()); },
+            "Address of what it shares with fields of the same kernels, while one of them lives.")
         .def_property_readonly("mean_sources", [](HeldField& self) { return self.field().mean_sources(); })
         .def_property_readonly("moment_bytes", [](HeldField& self) { return self.field().moment_bytes(); })
         .def_property_readonly(

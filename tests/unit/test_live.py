@@ -249,6 +249,16 @@ def test_quick_renderings_have_all_detail_of_a_texture(blur, renderer):
     assert worst < (0.02 if blur == 0 else 0.1)
 
 
+def three_renderings(renderer, scattered, receiver):
+    """A quick and an exact rendering, which is the bake, and an exact one by the convention."""
+    surface, texture = scattered.surface, scattered.texture
+    exact = renderer.exact(scattered)
+    job = BakeJob("Floor", texture.on(receiver), scattered.illumination, surface, scattered.settings, BAKE_STEPS)
+    np.testing.assert_allclose(exact.texture, job.run().texture, rtol=1e-4, atol=1e-6)
+    multiplied = replace(scattered, texture=surface.multiplied(texture))
+    return renderer.quick(scattered, 48), exact, renderer.exact(multiplied)
+
+
 def test_quick_renderings_show_how_light_scatters_in_a_texture(renderer):
     """With a noise of 10 % at 48 texels: their mean is right within 2 %, and half of the convention's error is gone."""
     plain = replace(live_target(LAMP), size=(96, 96))
@@ -258,10 +268,7 @@ def test_quick_renderings_show_how_light_scatters_in_a_texture(renderer):
     texture = Texture(receiver, (colors,), TextureUse())
     surface = plain.surface.colored(BaseColor(texture))
     scattered = replace(plain, texture=texture, surface=surface)
-    multiplied = replace(scattered, texture=surface.multiplied(texture))
-    quick, exact, other = renderer.quick(scattered, 48), renderer.exact(scattered), renderer.exact(multiplied)
-    job = BakeJob("Floor", texture.on(receiver), scattered.illumination, surface, scattered.settings, BAKE_STEPS)
-    np.testing.assert_allclose(exact.texture, job.run().texture, rtol=1e-4, atol=1e-6)
+    quick, exact, other = three_renderings(renderer, scattered, receiver)
     assert renderer.quick_side(scattered) <= 128 < renderer.quick_side(plain)  # paths take longer
     mean = exact.texture.mean()
     assert quick.texture.mean() == pytest.approx(mean, rel=0.02)
@@ -269,7 +276,7 @@ def test_quick_renderings_show_how_light_scatters_in_a_texture(renderer):
 
 
 def arch(faces=16, radius=0.4):
-    """Half of an open cylinder around the y axis."""
+    """Faces of half a cylinder without ends, whose axis is y."""
     turn = np.linspace(-np.pi / 2, np.pi / 2, faces + 1)
     at = np.stack([radius * np.sin(turn), 0 * turn, radius * np.cos(turn)], -1)
     corners, uvs = [], []
@@ -292,10 +299,7 @@ def test_textures_of_meshes_that_bend_scatter_light_in_live_as_in_bakes(renderer
     texture = Texture(receiver, (colors.astype(np.float32),), TextureUse())
     surface = plain.surface.colored(BaseColor(texture))
     scattered = replace(plain, texture=texture, surface=surface)
-    multiplied = replace(scattered, texture=surface.multiplied(texture))
-    quick, exact, other = renderer.quick(scattered, 48), renderer.exact(scattered), renderer.exact(multiplied)
-    job = BakeJob("Floor", texture.on(receiver), scattered.illumination, surface, scattered.settings, BAKE_STEPS)
-    np.testing.assert_allclose(exact.texture, job.run().texture, rtol=1e-4, atol=1e-6)
+    quick, exact, other = three_renderings(renderer, scattered, receiver)
     assert not any("multiplies" in str(message) for message in exact.messages)
     assert np.abs(quick.texture - exact.texture).mean() < 0.5 * np.abs(other.texture - exact.texture).mean()
 

@@ -1,4 +1,4 @@
-"""What receivers see, by rays and by boxes, and the time that bounced light takes there."""
+"""How enclosed and how lit receivers are, by rays and by boxes, and announced times of bounced light."""
 
 import numpy as np
 import pytest
@@ -41,7 +41,7 @@ def box_around(mesh):
 
 
 def test_the_part_that_a_plate_fills_is_its_form_factor():
-    """Of a square of side 2 a at the height a, seen from below its middle."""
+    """The plate is a square of side 2 a at the height a; the eye lies below its middle."""
     roof = plate(1.0, 1.0)
     x = 1 / np.sqrt(2)
     exact = 4 / np.pi * x * np.arctan(x)

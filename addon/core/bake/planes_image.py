@@ -80,7 +80,7 @@ class PlanesImage:
 
     @cached_property
     def _readings(self) -> list[tuple[NDArray, NDArray, NDArray, NDArray]]:
-        """Of each plane the numbers (N,) of texels, their weights, and texels of the image around them, see `_near`."""
+        """For each plane: numbers (N,) of the texels that it shows, their weights, and `_near` of them."""
         weights, sums = [], np.zeros(len(self.texels))
         for plane in self.planes:
             weights.append(np.maximum(1 - (plane.middle.distances(self.texels) / BLEND) ** 2, 0) ** 2)

@@ -105,7 +105,7 @@ void choose_blocks(const SurfaceBasis& basis, double tolerance, PointTable& tabl
                     all += octave * power[0];
                     continue;
                 }
-                // What the first block lacks far away has one sign and adds up over the surface: it stays to its end.
+                // Far light that the first block leaves out has one sign, so that errors add up: the block stays as long as there is light.
                 is_lit = is_lit || power[0] > 0.0;
                 for (std::size_t b = 0; b < basis.blocks; ++b) {
                     beyond[b] += octave * power[b];
