@@ -107,6 +107,10 @@ class Progress:
         """Estimate of the seconds that the whole still takes; None if unknown."""
         return self._whole._show()[0]
 
+    def words_left(self) -> str:
+        """The time that the whole still takes as a window shows it, without ever growing; "" if unknown."""
+        return "" if self._whole._show()[0] is None else self._whole._time_left.words()
+
     def time_fraction(self) -> float:
         """Finished fraction of the time that the whole takes; it never falls. The finished work if that is unknown."""
         return self._whole._show()[1]

@@ -19,6 +19,12 @@ FOLLOWING = 0.05
 MAX_LOOKS = 200
 """Number of earlier fractions that are kept of a stage."""
 
+MARGIN = 0.25
+"""Part by which the time left is shown longer than it is estimated; larger: more runs end early, fewer late."""
+
+SLACK = 0.25, 1.0
+"""Part of the time shown, and seconds, by which the estimate, or the time for which it stands, may exceed it unsaid."""
+
 
 class TimeLeft:
     """The time left as it is shown: it follows estimates without jumps."""
@@ -27,6 +33,8 @@ class TimeLeft:
         self._left: float | None = None
         self._fraction = self._time = 0.0
         self._looks: list[tuple[float, float]] = []
+        self._shown, self._shown_since = math.inf, 0.0
+        self._is_longer = False
 
     def begin_stage(self) -> None:
         """Forget the speed of the stage before."""
@@ -50,7 +58,27 @@ class TimeLeft:
             left = steady + (left - steady) * -math.expm1(-passed / (FOLLOWING * (lasted + max(left, steady, 1e-9))))
         self._left, self._time = left, now
         self._fraction = max(self._fraction, lasted / max(lasted + left, 1e-9))
+        self._show(now, left)
         return left, self._fraction
+
+    def words(self) -> str:
+        """The time left as a window shows it, such as "about 8 s left"; "" before the first update.
+
+        Its number never grows: if the estimate does, it stays, as what the run takes at least.
+        """
+        if math.isinf(self._shown):
+            return ""
+        return f"{'over' if self._is_longer else 'about'} {duration(self._shown)} left"
+
+    def _show(self, now: float, left: float) -> None:
+        shown = rounded_up((1.0 + MARGIN) * left)
+        if shown < self._shown:
+            self._shown, self._shown_since = shown, now
+        part, seconds = SLACK
+        most = (1.0 + part) * self._shown + seconds
+        # The words change back only once the number holds again, or they would flicker.
+        too_long = left > (self._shown if self._is_longer else most)
+        self._is_longer = too_long or now - self._shown_since > most
 
     def _by_speed(self, lasted: float, fraction: float) -> float | None:
         """Seconds left of a stage at its recent speed; None if it has not gone on recently."""
@@ -74,6 +102,15 @@ def stage_left(expected: float, lasted: float, fraction: float, by_speed: float 
         return by_plan
     weight = min(max(fraction, (lasted / expected) ** 2 if expected > 0 else 1.0), 1.0)
     return (1.0 - weight) * by_plan + weight * min(by_speed, LONGEST * (lasted + expected))
+
+
+def rounded_up(seconds: float) -> float:
+    """The next longer time that is worth a look of its own: whole seconds, five seconds, minutes or hours."""
+    for longest, step in ((10, 1), (60, 5), (3600, 60), (math.inf, 3600)):
+        rounded = step * max(math.ceil(seconds / step - 1e-9), 1)
+        if rounded <= longest:
+            return float(rounded)
+    return seconds
 
 
 def duration(seconds: float) -> str:

@@ -177,14 +177,14 @@ def test_the_window_shows_the_step_and_the_remaining_time_of_the_run(monkeypatch
         part.expect(lambda seconds=seconds: seconds)
     run = Run(progress, Target("Plane", "Stone"), "2 of 2")
     first.begin("Simulating")
-    assert run.in_short() == "0%, about 40 s left"
+    assert run.in_short() == "0%, about 50 s left"
     now[0] += 10
     first(1.0)
     second.begin("Baking")
-    assert run.line() == "Baking: Plane / Stone (2 of 2), 25%, about 30 s left (Esc cancels)"
+    assert run.line() == "Baking: Plane / Stone (2 of 2), 25%, about 40 s left (Esc cancels)"
     now[0] += 15
     second(0.5)
-    assert run.in_short() == "62%, about 15 s left"
+    assert run.in_short() == "62%, about 20 s left"
     progress.cancel()
     assert run.line() == "Stopping: Plane / Stone (2 of 2), 62% (Esc cancels)"
 

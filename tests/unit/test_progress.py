@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from beamspread import Cancelled, Medium, simulate
 from beamspread.core.progress import Progress
-from beamspread.core.time_left import FOLLOWING
+from beamspread.core.time_left import FOLLOWING, MARGIN, rounded_up
 
 
 def test_parts_join_to_one_range():
@@ -100,7 +100,7 @@ def test_without_an_estimate_the_time_left_is_unknown():
 
 
 def played(clock, planned, lasting, progress_of=lambda fraction: fraction, tick=0.1):
-    """(time, seconds left, fraction of the time) of a run whose stages last other times than planned.
+    """(time, seconds left, fraction of the time, words) of a run whose stages last other times than planned.
 
     Later stages are expected at the pace of those before. `progress_of` gives what a stage reports at a fraction of its
     time.
@@ -113,16 +113,27 @@ def played(clock, planned, lasting, progress_of=lambda fraction: fraction, tick=
         part.begin(f"Stage of {seconds} s")
         for step in range(round(seconds / tick)):
             part(progress_of(step * tick / seconds))
-            shown.append((clock[0] - begin, whole.seconds_left(), whole.time_fraction()))
+            shown.append((clock[0] - begin, whole.seconds_left(), whole.time_fraction(), whole.words_left()))
             clock[0] += tick
         part(1.0)
         pace[0], pace[1] = pace[0] + seconds, pace[1] + expected
-    shown.append((clock[0] - begin, whole.seconds_left(), whole.time_fraction()))
+    shown.append((clock[0] - begin, whole.seconds_left(), whole.time_fraction(), whole.words_left()))
     return shown
 
 
+def words(clock, planned, lasting, progress_of):
+    """(seconds left in truth, words of a window) of such a run."""
+    return [(sum(lasting) - now, said) for now, _, _, said in played(clock, planned, lasting, progress_of)]
+
+
+def seconds_in(said):
+    """The number of such words, in seconds."""
+    _, number, unit, _ = said.split()
+    return float(number) * {"s": 1, "min": 60, "h": 3600}[unit]
+
+
 def test_the_time_left_is_exact_where_the_plan_is(clock):
-    for now, left, fraction in played(clock, [4, 1, 15], [4, 1, 15]):
+    for now, left, fraction, _ in played(clock, [4, 1, 15], [4, 1, 15]):
         assert left == pytest.approx(20 - now, abs=0.1)
         assert fraction == pytest.approx(now / 20, abs=0.01)
 
@@ -148,17 +159,17 @@ def test_parts_of_a_part_share_its_estimate(clock):
 )
 def test_the_bar_never_falls_and_the_time_left_never_jumps(clock, planned, lasting, uneven):
     shown = played(clock, planned, lasting, uneven)
-    fractions = [fraction for *_, fraction in shown]
+    fractions = [fraction for *_, fraction, _ in shown]
     assert fractions == sorted(fractions)
     assert all(0 <= fraction <= 1 for fraction in fractions)
-    for (_, before, _), (_, after, _) in zip(shown, shown[1:]):
+    for (_, before, *_), (_, after, *_) in zip(shown, shown[1:]):
         # A jump passes within `FOLLOWING` of the run's time, which it can't exceed by much.
         assert abs(after - before) < 0.1 + 1.5 * 0.1 / FOLLOWING
 
 
 def test_a_run_that_is_slower_than_planned_says_so_after_its_first_stages(clock):
     shown = played(clock, [5] * 8, [10] * 8)
-    for now, left, _ in shown:
+    for now, left, *_ in shown:
         if now > 20:
             assert left == pytest.approx(80 - now, rel=0.35, abs=2)
 
@@ -166,6 +177,49 @@ def test_a_run_that_is_slower_than_planned_says_so_after_its_first_stages(clock)
 def test_an_early_end_of_a_stage_takes_its_time_away(clock):
     """Cycles ends once its noise is low: the stage jumps to its end."""
     shown = played(clock, [40, 10], [4, 10], lambda fraction: 0.1 * fraction)
-    left_at = {round(now, 1): left for now, left, _ in shown}
+    left_at = {round(now, 1): left for now, left, *_ in shown}
     assert left_at[3.9] > 40
     assert left_at[7.0] < 0.6 * left_at[3.9]
+
+
+SHAPES = [lambda f: f, lambda f: f**0.5, lambda f: f**2, lambda f: 0.0]
+PLANS = [[10], [3, 12], [5] * 6, [60, 20], [0.5, 0.2, 2]]
+FACTORS = [[0.3], [1], [2], [4], [0.3, 4], [4, 0.3], [1, 3, 0.5]]
+
+
+@pytest.mark.parametrize("factors", FACTORS)
+@pytest.mark.parametrize("planned", PLANS)
+@pytest.mark.parametrize("uneven", SHAPES)
+def test_the_time_that_a_window_shows_never_grows(clock, planned, factors, uneven):
+    """Stages take .3 to 4 times their estimates, and report at even and uneven speed or not at all."""
+    lasting = [seconds * factors[number % len(factors)] for number, seconds in enumerate(planned)]
+    numbers = [seconds_in(said) for _, said in words(clock, planned, lasting, uneven)]
+    assert numbers == sorted(numbers, reverse=True)
+    assert numbers[0] >= sum(planned)
+
+
+@pytest.mark.parametrize("planned", PLANS)
+def test_a_run_as_planned_has_its_time_and_a_margin(clock, planned):
+    """The number is the time left, by a quarter longer at most and rounded up; an end of a stage costs a twentieth."""
+    for left, said in words(clock, planned, planned, lambda f: f):
+        assert said.startswith("about")
+        assert left - 0.1 <= seconds_in(said) <= rounded_up((1 + MARGIN) * (1.05 * left + 0.1))
+
+
+def test_a_run_that_is_late_says_so(clock):
+    """It stands at its last number, as the least that is left, until that holds again."""
+    said = words(clock, [10], [40], lambda f: f)
+    assert said[0][1] == "about 15 s left"
+    assert sum(words.startswith("over") for _, words in said) > 0.3 * len(said)
+    # Words without a warning are not too short by more than the slack once the speed is known.
+    late = [(left, seconds_in(words)) for left, words in said if words.startswith("about") and left < 25]
+    assert late
+    assert all(left <= 1.5 * number + 1.5 for left, number in late)
+    # A stage that reports nothing shows by its time alone that it is late.
+    silent = [words for _, words in words(clock, [10], [40], lambda f: 0.0)]
+    assert sum(words.startswith("over") for words in silent) > 0.4 * len(silent)
+
+
+def test_times_are_rounded_up_to_what_is_worth_a_look():
+    rounded = [rounded_up(seconds) for seconds in (0, 0.4, 3.2, 10, 11, 59, 61, 3599, 3601, 1e5)]
+    assert rounded == [1, 1, 4, 10, 15, 60, 120, 3600, 7200, 100800]

@@ -17,7 +17,6 @@ from ...core.errors import BakeError
 from ...core.messages import Level, Message
 from ...core.progress import Progress
 from ...core.target import Target
-from ...core.time_left import duration
 from ..registration import all_or_nothing, handlers
 
 
@@ -85,8 +84,8 @@ class Run:
 
     def in_short(self) -> str:
         """Finished part of the run, and the time that it still takes."""
-        left = None if self.progress.is_cancelled else self.progress.seconds_left()
-        return f"{self.progress.time_fraction():.0%}{'' if left is None else f', about {duration(left)} left'}"
+        left = "" if self.progress.is_cancelled else self.progress.words_left()
+        return f"{self.progress.time_fraction():.0%}{left and f', {left}'}"
 
     def line(self) -> str:
         return f"{self.title()}, {self.in_short()} (Esc cancels)"

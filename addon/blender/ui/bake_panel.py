@@ -7,11 +7,12 @@ from collections.abc import Iterable
 
 from ...core import native
 from ...core.messages import Messages
+from ...core.time_left import duration
 from .. import compat
 from ..jobs.announced import line_of, seconds_of_frames, simulation_line, spread_lines
 from ..jobs.problems import problems_of
 from ..jobs.run.files_run import frames_of
-from ..jobs.state import Row, Status, duration, state
+from ..jobs.state import Row, Status, state
 from ..live import timer
 from ..node.find import find_targets, has_node, rendered_counts
 from ..popup import wrap

@@ -1,6 +1,6 @@
 """Runs inside the bpy module for estimates.py: bakes a scene, and prints a line of JSON for each bake.
 
-python THIS SCENE RESOLUTION TIMES
+python THIS SCENE RESOLUTION TIMES, where resolution 0 is the scene's own.
 """
 
 import json
@@ -66,7 +66,7 @@ def measure(path, resolution, times):
     beamspread.register()
     bpy.ops.wm.open_mainfile(filepath=str(path))
     scene = bpy.context.scene
-    scene.beamspread.resolution = resolution
+    resolution = scene.beamspread.resolution = resolution or scene.beamspread.resolution
     if not find_bakeable(bpy.context.view_layer):
         add_plane(scene)
     settings = scene.beamspread.for_bake()
