@@ -25,6 +25,9 @@ MARGIN = 0.25
 SLACK = 0.25, 1.0
 """Part of the time shown, and seconds, by which the estimate, or the time for which it stands, may exceed it unsaid."""
 
+MINUTES = 120
+"""Seconds from which on the time left is shown in minutes."""
+
 
 class TimeLeft:
     """The time left as it is shown: it follows estimates without jumps."""
@@ -68,7 +71,8 @@ class TimeLeft:
         """
         if math.isinf(self._shown):
             return ""
-        return f"{'over' if self._is_longer else 'about'} {duration(self._shown)} left"
+        number = duration(self._shown) if self._shown >= MINUTES else f"{self._shown:.0f} s"
+        return f"{'over' if self._is_longer else 'about'} {number} left"
 
     def _show(self, now: float, left: float) -> None:
         shown = rounded_up((1.0 + MARGIN) * left)
@@ -105,8 +109,8 @@ def stage_left(expected: float, lasted: float, fraction: float, by_speed: float 
 
 
 def rounded_up(seconds: float) -> float:
-    """The next longer time that is worth a look of its own: whole seconds, five seconds, minutes or hours."""
-    for longest, step in ((10, 1), (60, 5), (3600, 60), (math.inf, 3600)):
+    """The next longer time that is worth a look of its own: 1, 5 or 15 seconds, a minute or an hour."""
+    for longest, step in ((10, 1), (60, 5), (MINUTES, 15), (3600, 60), (math.inf, 3600)):
         rounded = step * max(math.ceil(seconds / step - 1e-9), 1)
         if rounded <= longest:
             return float(rounded)

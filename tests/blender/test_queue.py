@@ -12,13 +12,14 @@ from beamspread.blender.jobs.out_of_date import stale
 from beamspread.blender.jobs.run import bake_plan, operator
 from beamspread.blender.jobs.run.bake_plan import read_scene
 from beamspread.blender.jobs.run.bake_run import BakeThread, Pass, steps_of
-from beamspread.blender.jobs.state import Run, Status, duration, state
+from beamspread.blender.jobs.state import Run, Status, state
 from beamspread.blender.node.draw import draw_node
 from beamspread.blender.node.find import find_targets
 from beamspread.core.bake.runner import CANCELLED
 from beamspread.core.ldf import library
 from beamspread.core.progress import Progress
 from beamspread.core.target import Target
+from beamspread.core.time_left import duration
 from mathutils import Matrix
 from nodes import Nodes
 from scenes import add_material, add_plane, add_sun, messages_of, node_of, pixels, select

@@ -221,5 +221,5 @@ def test_a_run_that_is_late_says_so(clock):
 
 
 def test_times_are_rounded_up_to_what_is_worth_a_look():
-    rounded = [rounded_up(seconds) for seconds in (0, 0.4, 3.2, 10, 11, 59, 61, 3599, 3601, 1e5)]
-    assert rounded == [1, 1, 4, 10, 15, 60, 120, 3600, 7200, 100800]
+    rounded = [rounded_up(seconds) for seconds in (0, 0.4, 3.2, 10, 11, 59, 61, 119, 121, 3599, 3601, 1e5)]
+    assert rounded == [1, 1, 4, 10, 15, 60, 75, 120, 180, 3600, 7200, 100800]

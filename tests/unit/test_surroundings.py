@@ -97,3 +97,13 @@ def test_more_triangles_take_longer_and_bodies_less():
     assert seconds(100) < seconds(10**6)
     room = Surroundings(0.5, 0.5)
     assert seconds(around=room, is_bent=True) < seconds(around=room)
+
+
+def test_light_that_few_directions_bring_takes_longer():
+    """What rays have found counts, not how enclosed a surface is; the filter of Cycles removes part of that noise."""
+    even, spotty = (Surroundings(0.5, 1.0, returned) for returned in ((0.3, 0.3), (0.3, 0.6)))
+    dark = Surroundings(1.0, 0.0, (0.0, 0.0))
+    assert seconds(around=dark) < seconds(around=even) < seconds(around=spotty)
+    assert dark.bounced == 0
+    assert even.bounced_in_cycles == pytest.approx(0.3)
+    assert 0.3 < spotty.bounced_in_cycles < 0.6

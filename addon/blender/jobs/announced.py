@@ -27,7 +27,7 @@ from ..read.lights import lights_surfaces
 from ..read.node_kinds import NodeKinds, all_known, kinds_of
 from ..read.scene_cache import scene_cache
 from ..read.visibility import SURFACE_TYPES, by_name, placed, render_visible_names
-from .rays import traced_around
+from .rays import Look, Tracer, places_for
 from .state import Announced, state
 from .target_shape import Shape, grid_of, grid_of_bent, shape_of
 
@@ -42,8 +42,8 @@ LOW = 1e-4
 # Number of lines about the spread of light in a panel.
 MAX_LINES = 4
 
-# Part of the light of glowing meshes that nothing blocks, about.
-LIT_BY_MESHES = 0.5
+# Reflectance of materials whose color is not one value, and irradiance of emission of the same kind, W/m^2, about.
+REFLECTANCE, GLOW = 0.5, 5.0
 
 # Largest numbers of triangles and of objects among which rays are traced. More keep the window waiting.
 MAX_TRACED, MAX_TRACED_OBJECTS = 300_000, 500
@@ -59,7 +59,7 @@ def announce(context, targets: list[Target]) -> dict[Target, Announced]:
     scene, view_layer, depsgraph = context.scene, context.view_layer, context.evaluated_depsgraph_get()
     scene_cache.enter(depsgraph)
     objects, settings = by_name(scene), scene.beamspread.for_bake()
-    facts = _SceneFacts(scene, view_layer, depsgraph)
+    facts = _SceneFacts(scene, view_layer, depsgraph, len(targets))
     announced = {}
     bent_materials.clear()
     state.refused.clear()
@@ -74,7 +74,8 @@ def announce(context, targets: list[Target]) -> dict[Target, Announced]:
         if forecast is not None:
             bake = _announced(target, forecast, settings)
             spread = Spread.of(shape.length, forecast.surface, (grid.width, grid.height))
-            announced[target] = replace(bake, spread=spread if settings.layer == COMBINED else None)
+            around = forecast.finders.around if forecast.finders.around.returned is not None else None
+            announced[target] = replace(bake, spread=spread if settings.layer == COMBINED else None, around=around)
     return announced
 
 
@@ -100,10 +101,9 @@ def _announced(target: Target, forecast: Forecast, settings: BakeSettings) -> An
 class _SceneFacts:
     """Facts about the light of a scene."""
 
-    def __init__(self, scene, view_layer, depsgraph) -> None:
+    def __init__(self, scene, view_layer, depsgraph, targets: int) -> None:
         self.lights: list[Light] = []
         self.triangles, self.lamps_by_cycles, self.is_traceable = 0, 0, True
-        self._depsgraph = depsgraph
         self._boxes: list[tuple] = []
         visible = render_visible_names(view_layer)
         shown = (obj for obj in scene.objects if obj.name in visible)
@@ -117,6 +117,7 @@ class _SceneFacts:
         # Centers (N, 3) of the boxes around objects, and halves of their axes as columns (N, 3, 3).
         boxes = self._boxes or [(np.zeros(3), np.zeros((3, 3)))]
         self._centers, self._halves = map(np.array, zip(*boxes))
+        self._tracer = Tracer(depsgraph, self.lights, _look_of, places_for(targets))
 
     def _add_lamp(self, obj, matrix) -> None:
         light, reason = read_lamp(obj, matrix)
@@ -159,9 +160,7 @@ class _SceneFacts:
         """Surroundings of a target: by rays that Blender traces, or by boxes in large scenes."""
         if self.triangles <= MAX_TRACED and len(self._boxes) <= MAX_TRACED_OBJECTS:
             side = 1.0 if target.side == FRONT else -1.0
-            around = traced_around(self._depsgraph, target.obj, side, self.lights)
-            unread = max(self.world_by_cycles * (1 - around.enclosed), LIT_BY_MESHES * self._glowing)
-            return replace(around, lit=max(around.lit, unread))
+            return self._tracer.around(target.obj, side, self.world_by_cycles or self.unknown == OF_WORLD)
         obj = target.obj
         own = np.array(obj.bound_box) @ np.array(obj.matrix_world)[:3, :3].T + np.array(obj.matrix_world)[:3, 3]
         normal = None if grid is None else np.array(grid.normal)
@@ -203,6 +202,25 @@ class _SceneFacts:
 
 def _kinds(owner) -> NodeKinds:
     return scene_cache.get(("kinds", owner), [owner, owner.node_tree], lambda: kinds_of(owner))
+
+
+def _look_of(obj) -> Look:
+    """What rays see of an evaluated object: the means over its slots."""
+    materials = [slot.material.original for slot in obj.material_slots if slot.material is not None]
+    looks = [
+        scene_cache.get(("look", item), [item, item.node_tree], lambda item=item: _look(item)) for item in materials
+    ]
+    return tuple(np.mean(looks, axis=0).tolist()) if looks else (REFLECTANCE, 0.0)
+
+
+def _look(material) -> Look:
+    kinds = _kinds(material)
+    glow = 0.0 if not kinds.glows else GLOW if kinds.color is None else np.pi * float(np.mean(kinds.color))
+    nodes = material.node_tree.nodes if compat.uses_nodes(material) else ()
+    sockets = [node.inputs.get("Base Color") or node.inputs.get("Color") for node in nodes if "Bsdf" in node.bl_idname]
+    plain = [float(np.mean(item.default_value[:3])) for item in sockets if item is not None and not item.is_linked]
+    is_plain = plain and len(plain) == len(sockets)
+    return (float(np.mean(plain)) if is_plain else REFLECTANCE) * (kinds.color is None), glow
 
 
 def _is_valid(target: BakeTarget) -> bool:

@@ -2,75 +2,168 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import math
+from collections.abc import Callable, Sequence
 
 import numpy as np
 from mathutils import Vector
 
 from ...core.bake.surroundings import Surroundings, directions_of
-from ...core.scene.lights import Light, WorldLight
+from ...core.scene.lights import AreaLight, Light, SpotLight, WorldLight
 
-# Places on the object from which rays start, and directions from each. More: surer, slower scans.
-PLACES, DIRECTIONS = 16, 8
+# Places on an object from which rays start, if there are few objects, the fewest, and their sum over all objects; and
+# directions from each. More: surer, slower scans.
+PLACES, FEWEST_PLACES, ALL_PLACES, DIRECTIONS = 16, 2, 128, 8
 
-# Length that keeps a ray off the surface from which it starts, relative to the size of the object.
-LIFT = 1e-3
+# Lamps to which shadow rays go from a point; of more, so many are drawn. More: surer, slower scans.
+MAX_LAMPS = 8
+
+# Length that keeps a ray off the surface from which it starts, relative to the size of the object, or to the length of
+# the ray that has met it.
+LIFT, LIFT_OF_HIT = 1e-3, 1e-4
 
 # Length of a ray without an end; Blender takes single precision.
 FAR = 1e9
 
+# Light that arrives after two or more bounces over that which arrives after two, about.
+LATER_BOUNCES = 1.5
 
-def traced_around(depsgraph, obj, side: float, lights: Sequence[Light]) -> Surroundings:
-    """Surroundings of the faces of an object; `side`: -1 for the faces' backs, else 1."""
-    places, normals = _places_on(obj.evaluated_get(depsgraph), side)
-    if not len(places):
-        return Surroundings()
-    directions = [directions_of(normal, DIRECTIONS, turn) for turn, normal in enumerate(normals)]
-    starts = np.repeat(places, DIRECTIONS, axis=0)
-    enclosed = float(np.mean([_is_blocked(depsgraph, *ray) for ray in zip(starts, np.concatenate(directions))]))
-    parts = [
-        float(not _is_blocked(depsgraph, place, *way))
-        for light in lights
-        for place, normal in zip(places, normals)
-        if (way := _way_to(light, place)) is not None and way[0] @ normal > 0
-    ]
-    parts += [1.0 - enclosed for light in lights if isinstance(light, WorldLight)]
-    return Surroundings(enclosed, float(np.mean(parts)) if parts else 1.0)
+Look = tuple[float, float]
+"""Reflectance of an object's materials, and the irradiance of even light of their radiance, W/m^2, about."""
 
 
-def _places_on(obj, side: float) -> tuple[np.ndarray, np.ndarray]:
-    """Places (N, 3) a little above some faces of an evaluated object, and the normals there.
+class Tracer:
+    """Traces light to objects by few rays.
 
-    Each of few faces has several places.
+    `look_of` : the `Look` of an evaluated object; `places`: on each object, from which rays start.
     """
-    mesh, matrix = obj.data, np.array(obj.matrix_world)
-    if not len(mesh.polygons):
-        return np.zeros((0, 3)), np.zeros((0, 3))
-    turn = side * np.linalg.pinv(matrix[:3, :3]).T
-    lift = LIFT * max(obj.dimensions)
-    places, normals = [], []
-    for number in np.unique(np.linspace(0, len(mesh.polygons) - 1, PLACES).astype(int)).tolist():
-        face = mesh.polygons[number]
-        normal = turn @ np.array(face.normal)
-        normal /= np.linalg.norm(normal) or 1.0
-        corners = [mesh.vertices[index].co for index in face.vertices] if len(mesh.polygons) < PLACES else []
-        for point in [face.center, *((corner + face.center) / 2 for corner in corners)]:
-            places.append(matrix[:3, :3] @ np.array(point) + matrix[:3, 3] + lift * normal)
-            normals.append(normal)
-    return np.array(places), np.array(normals)
+
+    def __init__(
+        self, depsgraph, lights: Sequence[Light], look_of: Callable[[object], Look], places: int = PLACES
+    ) -> None:
+        self._depsgraph, self._look_of, self._places = depsgraph, look_of, places
+        self._lamps = [light for light in lights if hasattr(light, "direction") or hasattr(light, "position")]
+        skies = [light for light in lights if isinstance(light, WorldLight)]
+        self._sky = sum(math.pi * float(np.mean(light.radiance)) * float(light.rgb().mean()) for light in skies)
+        self._looks: dict[str, Look] = {}
+        self._random = np.random.default_rng(1)
+
+    def around(self, obj, side: float, has_unknown_sky: bool) -> Surroundings:
+        """Surroundings of the faces of an object; `side`: -1 for the faces' backs, else 1.
+
+        `has_unknown_sky`: True if the sky gives light of a strength that is not known: it counts as much as the lamps.
+        """
+        places, normals = self._places_on(obj.evaluated_get(self._depsgraph), side)
+        if not len(places):
+            return Surroundings()
+        arriving, open_light = np.array([self._of_lamps(*at) for at in zip(places, normals)]).T
+        sky = self._sky + has_unknown_sky * (float(open_light.mean()) or 1.0)
+        count = len(places) * DIRECTIONS
+        direct, bounced = float(arriving.mean()), []
+        for turn, (place, normal) in enumerate(zip(places, normals)):
+            for direction in directions_of(normal, DIRECTIONS, turn):
+                hit = self._hit(place, direction)
+                if hit is None:
+                    direct += sky / count
+                    continue
+                reflectance, glow = hit[2]
+                direct += glow / count
+                bounced.append(reflectance * self._irradiance(*hit[:2], sky))
+        everything = direct + sum(bounced) / count
+        mean, square = sum(bounced) / count, sum(value * value for value in bounced) / count
+        returned = (mean / everything, math.sqrt(square) / everything) if everything > 0 else (0.0, 0.0)
+        enclosed = len(bounced) / count
+        lit = float(arriving.sum() / open_light.sum()) if open_light.any() else 1.0 - enclosed
+        return Surroundings(enclosed, lit, returned)
+
+    def _irradiance(self, point: np.ndarray, normal: np.ndarray, sky: float) -> float:
+        """Irradiance of a surface that a ray has met: of lamps, and from one direction of the hemisphere."""
+        turn, number = self._random.uniform(0, 2 * math.pi), self._random.integers(DIRECTIONS)
+        hit, direct = (
+            self._hit(point, directions_of(normal, DIRECTIONS, turn)[number]),
+            self._of_lamps(point, normal)[0],
+        )
+        if hit is None:
+            return direct + sky
+        there, facing, (reflectance, glow) = hit
+        return direct + glow + LATER_BOUNCES * reflectance * self._of_lamps(there, facing)[0]
+
+    def _of_lamps(self, point: np.ndarray, normal: np.ndarray) -> tuple[float, float]:
+        """Irradiance of lamps, with shadows and without."""
+        lamps, factor = self._lamps, 1.0
+        if len(lamps) > MAX_LAMPS:
+            numbers = self._random.choice(len(lamps), MAX_LAMPS, replace=False)
+            lamps, factor = [lamps[number] for number in numbers], len(lamps) / MAX_LAMPS
+        arriving = open_light = 0.0
+        for lamp in lamps:
+            irradiance, direction, distance = _from_lamp(lamp, point, normal)
+            if irradiance > 0:
+                open_light += factor * irradiance
+                is_lit = not lamp.cast_shadow or not self._cast(point, direction, distance)[0]
+                arriving += factor * irradiance * is_lit
+        return arriving, open_light
+
+    def _hit(self, start: np.ndarray, direction: np.ndarray) -> tuple[np.ndarray, np.ndarray, Look] | None:
+        """Point slightly above what a ray meets, its normal towards the ray's start, and its look."""
+        is_hit, point, normal, _, obj, _ = self._cast(start, direction)
+        if not is_hit:
+            return None
+        normal = np.array(normal)
+        if normal @ direction > 0:
+            normal = -normal
+        lift = LIFT_OF_HIT * float(np.linalg.norm(np.array(point) - start))
+        if obj.name not in self._looks:
+            self._looks[obj.name] = self._look_of(obj)
+        return np.array(point) + lift * normal, normal, self._looks[obj.name]
+
+    def _cast(self, start, direction, distance: float = FAR) -> tuple:
+        scene = self._depsgraph.scene
+        return scene.ray_cast(self._depsgraph, Vector(start), Vector(direction), distance=distance)
+
+    def _places_on(self, obj, side: float) -> tuple[np.ndarray, np.ndarray]:
+        """Places (N, 3) a little above some faces of an evaluated object, and the normals there.
+
+        Each of few faces has several places.
+        """
+        mesh, matrix = obj.data, np.array(obj.matrix_world)
+        if not len(mesh.polygons):
+            return np.zeros((0, 3)), np.zeros((0, 3))
+        turn = side * np.linalg.pinv(matrix[:3, :3]).T
+        lift = LIFT * max(obj.dimensions)
+        places, normals, few = [], [], self._places
+        for number in np.unique(np.linspace(0, len(mesh.polygons) - 1, few).astype(int)).tolist():
+            face = mesh.polygons[number]
+            normal = turn @ np.array(face.normal)
+            normal /= np.linalg.norm(normal) or 1.0
+            corners = [mesh.vertices[index].co for index in face.vertices] if len(mesh.polygons) < few else []
+            for point in [face.center, *((corner + face.center) / 2 for corner in corners)]:
+                places.append(matrix[:3, :3] @ np.array(point) + matrix[:3, 3] + lift * normal)
+                normals.append(normal)
+        return np.array(places), np.array(normals)
 
 
-def _way_to(light: Light, place: np.ndarray) -> tuple | None:
-    """Direction and distance of a lamp; None if it has no place."""
-    if hasattr(light, "direction"):
-        return -np.array(light.direction), FAR
-    if not hasattr(light, "position"):
-        return None
-    way = np.array(light.position) - place
-    distance = float(np.linalg.norm(way))
-    return (way / distance, distance) if distance > 0 else None
+def places_for(objects: int) -> int:
+    """Places on each of so many objects from which rays start."""
+    return min(max(ALL_PLACES // max(objects, 1), FEWEST_PLACES), PLACES)
 
 
-def _is_blocked(depsgraph, start, direction, distance: float = FAR) -> bool:
-    """True if a ray meets a face within a distance."""
-    return depsgraph.scene.ray_cast(depsgraph, Vector(start), Vector(direction), distance=distance)[0]
+def _from_lamp(lamp: Light, point: np.ndarray, normal: np.ndarray) -> tuple[float, np.ndarray, float]:
+    """Irradiance of a lamp without obstacles, W/m^2, and direction and distance of its center."""
+    strength = float(lamp.rgb().mean())
+    if hasattr(lamp, "direction"):
+        direction = -np.array(lamp.direction)
+        return strength * max(float(direction @ normal), 0.0), direction, FAR
+    way = np.array(lamp.position) - point
+    distance = float(np.linalg.norm(way)) or 1e-9
+    direction = way / distance
+    falloff = max(float(direction @ normal), 0.0) / distance**2
+    if isinstance(lamp, AreaLight):
+        # Of the radiance strength / (4 area), as seen from afar.
+        axis = np.array(lamp.frame[2])
+        facing = max(float(direction @ axis) / (float(np.linalg.norm(axis)) or 1.0), 0.0)
+        return 0.25 * strength * facing * falloff, direction, distance
+    if isinstance(lamp, SpotLight):
+        axis = np.array(lamp.frame[2])
+        is_inside = direction @ axis >= math.cos(0.5 * lamp.spot_size) * (float(np.linalg.norm(axis)) or 1.0)
+        falloff *= bool(is_inside)
+    return strength / (4 * math.pi) * falloff, direction, distance

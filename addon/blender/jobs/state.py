@@ -13,6 +13,7 @@ from bpy.app.handlers import persistent
 from ...core.bake.pace import Estimate, pace
 from ...core.bake.runner import CANCELLED, WRITTEN, Bake
 from ...core.bake.spread import Spread
+from ...core.bake.surroundings import Surroundings
 from ...core.errors import BakeError
 from ...core.messages import Level, Message
 from ...core.progress import Progress
@@ -52,11 +53,13 @@ class Announced:
     steps : estimates of its steps.
     simulations : estimates of the simulations that it needs first, by medium and quality: bakes share them.
     spread : how far light spreads in the image; None if the result is not luminance.
+    around : surroundings of the object by rays; None if none were traced.
     """
 
     steps: tuple[Estimate, ...]
     simulations: dict[object, Estimate]
     spread: Spread | None = None
+    around: Surroundings | None = None
 
 
 @dataclass(frozen=True)

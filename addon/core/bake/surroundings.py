@@ -23,7 +23,7 @@ OPEN_PATH, ROOM_PATH = 1.0, 1.7
 
 # Paths of each part of the hemisphere at a node that bring the noise of light that is all bounced to one percent, on
 # planes and on surfaces that bend; and the fewest that are traced.
-PATHS, BENT_PATHS, MIN_PATHS = 280.0, 100.0, 4.0
+PATHS, BENT_PATHS, MIN_PATHS = 280.0, 100.0, 2.0
 
 # The same of paths by Cycles, which nothing guides: on planes, where a filter helps, and on bent surfaces; the fewest
 # and the most; and seconds of one thread for each.
@@ -50,16 +50,26 @@ class Surroundings:
     ----------
     enclosed : part of the light that would arrive from objects under even light: 0 in the open, 1 in a closed room.
     lit : part of the lamps' light that nothing blocks.
+    returned : mean and root mean square of bounced light over directions, relative to the mean of all light; None if
+        they are not known.
     """
 
     enclosed: float = 0.0
     lit: float = 1.0
+    returned: tuple[float, float] | None = None
 
     @property
     def bounced(self) -> float:
-        """Part of all light that is bounced, about."""
+        """Part of all light that is bounced, about; more where few directions bring it, whose noise is larger."""
+        if self.returned is not None:
+            return self.returned[1]
         bounced = BOUNCED_PART * self.enclosed
         return bounced / max(self.lit + bounced, 1e-9)
+
+    @property
+    def bounced_in_cycles(self) -> float:
+        """The same for light by Cycles, whose filter removes part of the noise of bright directions."""
+        return self.bounced if self.returned is None else math.sqrt(math.prod(self.returned))
 
 
 OPEN = Surroundings()
@@ -81,7 +91,7 @@ def bounced_seconds(
 def bounced_seconds_of_cycles(around: Surroundings, nodes: float, is_bent: bool) -> float:
     """Seconds in which Cycles finds bounced light at so many nodes, besides its start."""
     least, most = CYCLES_LIMITS
-    paths = min(max((CYCLES_BENT_PATHS if is_bent else CYCLES_PATHS) * around.bounced**2, least), most)
+    paths = min(max((CYCLES_BENT_PATHS if is_bent else CYCLES_PATHS) * around.bounced_in_cycles**2, least), most)
     return parallel_seconds(CYCLES_PATH * paths * nodes * len(STRATA), 0)
 
 

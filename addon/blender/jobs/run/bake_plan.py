@@ -12,6 +12,7 @@ import bpy
 import numpy as np
 
 from ....core.bake.bake_settings import COMBINED, BakeSettings
+from ....core.bake.bounced import BouncedLight
 from ....core.bake.finish import with_seams
 from ....core.bake.forecast import Finders, Forecast
 from ....core.bake.job import BakeJob
@@ -39,6 +40,7 @@ from ...read.base_color import read_texture
 from ...read.lights import read_illumination
 from ...read.scene_cache import SceneCache, scene_cache
 from ...read.visibility import as_rendered, check_instance, find_instances, render_visible_names
+from ..state import state
 from .receiving import Receiving, read_receiver, sized
 
 PLACEHOLDER_COLOR = (0.5, 0.5, 0.5)
@@ -108,9 +110,16 @@ class BakePlan:
 
     def _around(self, grids: list[AnyGrid], light: Illumination, has_unknown_sky: bool) -> Surroundings:
         """Surroundings of the receiver; by boxes around objects where rays would keep the window waiting."""
+        if self._announced_around() is not None:
+            return self._announced_around()
         if light.triangle_count <= MAX_TRACED:
             return surroundings_of(grids, light, has_unknown_sky)
         return Surroundings(max(map(self.by_cycles.enclosed_part, grids)))
+
+    def _announced_around(self) -> Surroundings | None:
+        """Surroundings by the rays with which the bake was announced, which know what color surfaces have."""
+        announced = state.announced.get(self.target)
+        return None if announced is None else announced.around
 
     def bake(self, settings: BakeSettings) -> Bake:
         """The bake, with its job or the error; call it in the main thread."""
@@ -123,6 +132,9 @@ class BakePlan:
                 self.target.object_name, receiver, illumination, self.surface_with_color(), settings, BAKE_STEPS
             )
             job = self._with_color(self.by_cycles.complete(job))
+            around = self._announced_around()
+            known = [replace(step, around=around) if isinstance(step, BouncedLight) else step for step in job.steps]
+            job = replace(job, steps=tuple(known))
             if settings.layer == COMBINED:
                 job = replace(job, spread=Spread.of(length_of(self.mesh), job.surface, mean_size(self.mesh, self.size)))
             job.check_memory()
