@@ -15,7 +15,7 @@ namespace beamspread {
 enum class RayMethod : std::uint8_t {
     none,    // the light can't reach it
     open,    // as many as in the first pass, which nothing blocks
-    even,    // all rays
+    even,    // all rays, or fewer where obstacles block little of the light
     guided,  // guided rays: all, or fewer where little light arrives
     single   // one, where no ray has found light: few texels find the light that all of them lack
 };
@@ -65,14 +65,16 @@ private:
         std::uint8_t visible = 0;  // part of the light that arrives, in steps of 1 / 255, rounded up
     };
 
-    // Obstacles and light of a texel and its neighbors, and the part of the light that may arrive.
+    // Obstacles and light of a texel and its neighbors, and the parts of the light that may arrive and be blocked.
     struct Around {
         std::uint8_t met = Met::nothing;
         double visible = 0.0;
+        double blocked = 0.0;
     };
 
     Around around(std::size_t x, std::size_t y) const;
     RayMethod method_of(std::uint8_t met_around, std::size_t x, std::size_t y) const;
+    std::size_t even_rays(double blocked) const;
     std::size_t guided_rays(double visible, std::size_t x, std::size_t y) const;
 
     std::size_t m_width, m_height, m_first_rays, m_max_rays;
