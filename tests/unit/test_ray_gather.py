@@ -198,7 +198,7 @@ def test_a_first_pass_keeps_light_and_spares_rays():
 
 
 def test_noise_is_even_where_obstacles_block_much_and_little_of_the_sky():
-    """Texels have rays by the part of the sky that is blocked; equal numbers leave a third of the noise where it is small.
+    """Texels have rays by the blocked part of the sky; equal numbers leave a third of the noise where it is small.
 
     A texel's share is that of the form factors of the cards (Lambert). The total is that of all rays from all texels
     within 1e-3: where no first ray of a texel and its neighbors meets a card, as little as 7e-4 of it counts as open.
@@ -210,7 +210,8 @@ def test_noise_is_even_where_obstacles_block_much_and_little_of_the_sky():
     lamps = [native.AreaLight((x, y, z), FRAME, 2 * scale, 2 * scale) for x, y, scale, z in places]
     areas = [4 * scale**2 for _, _, scale, _ in places]
     covered = sum(4 * area * native.gather_rays(grid, lamp)[0][..., 0] for lamp, area in zip(lamps, areas)) / math.pi
-    bakes = [native.gather_rays(grid, sky, cards, rays=128, even_rays=16, seed=s)[0][..., 0] / math.pi for s in range(8)]
+    few = {"rays": 128, "even_rays": 16}
+    bakes = [native.gather_rays(grid, sky, cards, **few, seed=seed)[0][..., 0] / math.pi for seed in range(8)]
     noise = np.std(bakes, axis=0, ddof=1) / (1 - covered)
     little, half = ((covered > low) & (covered < high) for low, high in ((0.02, 0.06), (0.4, 0.6)))
     assert min(little.sum(), half.sum()) > 30
