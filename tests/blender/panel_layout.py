@@ -35,7 +35,7 @@ class Layout:
 def context():
     """Height of a panel of Blender's default width."""
     preferences = SimpleNamespace(system=SimpleNamespace(ui_scale=1.0))
-    region = SimpleNamespace(width=280)
+    region = SimpleNamespace(width=280, type="WINDOW")
     return SimpleNamespace(
         region=region, preferences=preferences, scene=bpy.context.scene, view_layer=bpy.context.view_layer
     )

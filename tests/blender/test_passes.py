@@ -220,7 +220,7 @@ def drawn(*panels_drawn):
 class Context:
     """Characters that fit a panel 300 pixels wide; without a window, Blender has no scale of its interface."""
 
-    region = SimpleNamespace(width=300)
+    region = SimpleNamespace(width=300, type="WINDOW")
     preferences = SimpleNamespace(system=SimpleNamespace(ui_scale=1.0))
 
     def __getattr__(self, name):

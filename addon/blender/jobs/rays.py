@@ -15,6 +15,9 @@ from ...core.scene.lights import AreaLight, Light, SpotLight, WorldLight
 # directions from each. More: surer, slower scans.
 PLACES, FEWEST_PLACES, ALL_PLACES, DIRECTIONS = 16, 2, 128, 8
 
+# Least number of places on each face of an object that has few, and part of an edge from one place to the next.
+MANY_ON_FACE, GOLDEN = 5, 0.618034
+
 # Lamps to which shadow rays go from a point; of more, so many are drawn. More: surer, slower scans.
 MAX_LAMPS = 8
 
@@ -135,11 +138,22 @@ class Tracer:
             face = mesh.polygons[number]
             normal = turn @ np.array(face.normal)
             normal /= np.linalg.norm(normal) or 1.0
-            corners = [mesh.vertices[index].co for index in face.vertices] if len(mesh.polygons) < few else []
-            for point in [face.center, *((corner + face.center) / 2 for corner in corners)]:
-                places.append(matrix[:3, :3] @ np.array(point) + matrix[:3, 3] + lift * normal)
+            center = np.array(face.center)
+            corners = np.array([mesh.vertices[index].co for index in face.vertices])
+            count = 1 if len(mesh.polygons) >= few else max(few // len(mesh.polygons), MANY_ON_FACE)
+            for point in [center] if count == 1 else _spread_over(corners, center, count):
+                places.append(matrix[:3, :3] @ point + matrix[:3, 3] + lift * normal)
                 normals.append(normal)
         return np.array(places), np.array(normals)
+
+
+def _spread_over(corners: np.ndarray, center: np.ndarray, count: int) -> np.ndarray:
+    """Points (count, 3) spread evenly over the triangles between a face's center and its edges."""
+    number = np.arange(count)
+    outwards, along = np.sqrt((number + 0.5) / count), number * GOLDEN % 1.0
+    first = corners[number % len(corners)]
+    on_edge = first + along[:, None] * (corners[(number + 1) % len(corners)] - first)
+    return center + outwards[:, None] * (on_edge - center)
 
 
 def places_for(objects: int) -> int:

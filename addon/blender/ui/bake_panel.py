@@ -36,14 +36,15 @@ ICONS = {
 }
 
 
-# Pixels of a panel beside its text, and of an average letter, at a user-interface scale of 1.
-BORDER_PIXELS, LETTER_PIXELS = 60, 6.4
+# Pixels beside a panel's text, of the tabs of a side bar, and of an average letter, at a user-interface scale of 1.
+BORDER_PIXELS, TAB_PIXELS, LETTER_PIXELS = 60, 24, 6.4
 
 
 def draw_lines(layout, context, lines: Iterable[str], icon: str) -> None:
     """Draw texts after an icon each, wrapped to the panel's width."""
     pixels = context.region.width / context.preferences.system.ui_scale
-    width = max(20, int((pixels - BORDER_PIXELS) / LETTER_PIXELS))
+    beside = BORDER_PIXELS + TAB_PIXELS * (context.region.type == "UI")
+    width = max(20, int((pixels - beside) / LETTER_PIXELS))
     for text in lines:
         column = layout.column(align=True)
         for number, line in enumerate(wrap(text, width)):
