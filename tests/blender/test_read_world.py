@@ -6,6 +6,8 @@ import bpy
 import numpy as np
 import pytest
 from beamspread.blender.read.image_nodes import MAX_WIDTH, shrunk
+from beamspread.blender.read.lights import read_illumination
+from beamspread.blender.read.scene_cache import scene_cache
 from beamspread.blender.read.world_light import directions
 from cycles_truth import add_receiver, cycles_irradiance, read
 from mathutils import Euler, Matrix
@@ -242,3 +244,29 @@ def test_negative_light_is_named():
     add_world(strength=-1)
     assert read().lights == ()
     assert "The light 'World' is left out. The color of 'World' is -1, -1, -1" in read().messages[0].text
+
+
+def test_a_panorama_stays_while_the_strength_of_its_background_changes():
+    """The cache keeps it for numbers of strength alone: not for another color, or a strength by nodes."""
+    nodes, background = add_world()
+    texture = add_environment(studio("forest"), background, turn=(0.0, 0.0, 0.4))
+    mapping = texture.inputs["Vector"].links[0].from_node
+
+    def read_again():
+        bpy.context.view_layer.update()
+        (light,) = read_illumination(bpy.context.evaluated_depsgraph_get(), scene_cache).lights
+        return light
+
+    first = read_again()
+    background.inputs["Strength"].default_value = 2.5
+    second = read_again()
+    assert second.radiance is first.radiance
+    assert second.rgb() == pytest.approx(2.5 * first.rgb())
+    mapping.inputs["Rotation"].default_value[2] = 1.0
+    turned = read_again()
+    assert turned.to_world != first.to_world
+    assert irradiance(turned, (1, 0, 0)) != pytest.approx(irradiance(second, (1, 0, 0)), rel=1e-2)
+    nodes.set(background.inputs["Strength"], nodes.add("Value").outputs[0])
+    nodes.of_type("VALUE").outputs[0].default_value = 0.5
+    by_node = read_again()
+    assert irradiance(by_node, (1, 0, 0)) == pytest.approx(irradiance(turned, (1, 0, 0)) * 0.2, rel=1e-5)

@@ -4,6 +4,7 @@ import math
 
 import numpy as np
 import pytest
+from beamspread.core.scene.lights import WorldLight
 from beamspread.core.scene.sampling import bilinear, nearest, resized
 
 IMAGE = np.random.default_rng(1).random((5, 7, 3)).astype(np.float32)
@@ -47,3 +48,30 @@ def test_resized_is_the_interpolation_at_the_new_texels(size, extension, is_smoo
     at = tuple(axis.ravel() for axis in np.meshgrid(columns, rows))
     expected = (bilinear if is_smooth else nearest)(IMAGE, *at, extension, extension)
     np.testing.assert_allclose(resized(IMAGE, *size, extension, is_smooth), expected.reshape(*size, 3), atol=1e-6)
+
+
+@pytest.mark.parametrize("extension", ["EXTEND", "REPEAT", "MIRROR", "CLIP"])
+def test_centers_of_texels_have_their_values(extension):
+    """But for rounding of positions; a hundredth of a texel away values blend."""
+    image = np.random.default_rng(2).random((5, 7, 3))
+    y, x = (axis.ravel() for axis in np.mgrid[-2:8, -3:10])
+    expected = nearest(image, x + 0.5, y + 0.5, extension, extension)
+    for shift in (0.0, 1e-9, -1e-9):
+        np.testing.assert_allclose(
+            bilinear(image, x + 0.5 + shift, y + 0.5, extension, extension), expected, atol=1e-12
+        )
+    assert np.abs(bilinear(image, x + 0.51, y + 0.5, extension, extension) - expected).max() > 1e-3
+
+
+def test_a_coarse_world_has_means_of_texels():
+    """By slices where blocks fit into the image, else by sums of what is there."""
+    for rows, step in ((24, 3), (25, 3)):
+        light = WorldLight(
+            "Sky", 1.0, (1, 1, 1), True, np.random.default_rng(4).random((rows, 2 * rows, 3), np.float32), np.eye(3)
+        )
+        coarse = light.coarse(9 if rows % step else 8)
+        expected = [
+            [light.radiance[y : y + step, x : x + step].mean((0, 1)) for x in range(0, 2 * rows, step)]
+            for y in range(0, rows, step)
+        ]
+        np.testing.assert_allclose(coarse.radiance, expected, rtol=1e-5)

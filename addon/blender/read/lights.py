@@ -17,7 +17,7 @@ from .emitters import VARYING, EmissiveMesh, radiance_of
 from .geometry import GEOMETRY_TYPES, OccluderReader, casts_shadows, lost_instance, lost_triangles, shapes_of
 from .image_nodes import missing_images
 from .lamps import fault, is_portal, read_lamp
-from .nodes import Links, surface_of
+from .nodes import InputSocket, Links, surface_of
 from .reflection import MediumOf
 from .scene_cache import SceneCache
 from .visibility import left_out, left_out_of_world, render_visible_names, renders, with_instanced
@@ -194,7 +194,12 @@ class _Lights:
     def _read_world(self, view_layer, world) -> tuple[Light | None, NotSupportedError | None]:
         cache, block = self._cache, world.original
         key, images = ("world", block, view_layer.use_sky), cache.tree(world).images
-        return cache.get(key, [block], lambda: read_world(view_layer, world, cache.images, cache.check), images)
+
+        def keep(color: InputSocket, read: Callable[[], Light | None]) -> Light | None:
+            tree = cache.texture(block, color)
+            return cache.get(("panorama", block), [], read, tree.images, tree.text)
+
+        return cache.get(key, [block], lambda: read_world(view_layer, world, cache.images, cache.check, keep), images)
 
     def _warn_of(
         self, name: str, text: str, reason: NotSupportedError, missing: list[MissingImageError], links: dict

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 
@@ -10,7 +11,7 @@ from ...core.errors import NotSupportedError
 from ...core.scene.lights import WorldLight
 from .. import compat
 from .image_nodes import MAX_WIDTH, Images
-from .nodes import InputSocket, surface_of
+from .nodes import InputSocket, Links, surface_of
 from .shading import ON_NO_PATH, ShadingPoints
 
 # Size in texels of a panorama without images: a quarter of a degree per texel.
@@ -19,10 +20,21 @@ WIDTH, HEIGHT = 1440, 720
 ROWS = 64
 
 
+Keep = Callable[[InputSocket, Callable[[], WorldLight | None]], WorldLight | None]
+"""Returns the light of a color, which it reads by the function unless the nodes before the color are as before."""
+
+
 def read_world(
-    view_layer, world, images: Images, check: Callable[[], None] | None = None
+    view_layer,
+    world,
+    images: Images,
+    check: Callable[[], None] | None = None,
+    keep: Keep = lambda _color, read: read(),
 ) -> tuple[WorldLight | None, NotSupportedError | None]:
-    """Light of a world, None if there is none or it is dark, and the reason why it is left out, if so."""
+    """Light of a world, None if there is none or it is dark, and the reason why it is left out, if so.
+
+    A background of constant strength keeps its panorama while the strength changes.
+    """
     if world is None or not view_layer.use_sky or not world.cycles_visibility.diffuse:
         return None, None
     if not compat.uses_nodes(world):
@@ -30,10 +42,23 @@ def read_world(
     surface = surface_of(world.node_tree)
     if surface is None:
         return None, None
+    strength, wanted = _strength_and_color(surface)
     try:
-        return _panorama(world.name, surface, images, check), None
+        light = keep(wanted, lambda: _panorama(world.name, wanted, images, check))
+        return light and replace(light, name=world.name, strength=strength), None
     except NotSupportedError as error:
         return None, error.with_traceback(None)
+
+
+def _strength_and_color(surface: InputSocket) -> tuple[float, InputSocket]:
+    """Strength and color of a background whose strength is a number; 1 and the surface itself for all others."""
+    source = Links().source(surface)
+    if source.node.bl_idname != "ShaderNodeBackground":
+        return 1.0, surface
+    strength, color = source.input("Strength"), source.input("Color")
+    if strength.socket.is_linked or not color.socket.is_linked or not strength.socket.default_value > 0:
+        return 1.0, surface
+    return strength.socket.default_value, color
 
 
 def _even(name: str, color: np.ndarray) -> WorldLight | None:

@@ -8,6 +8,9 @@ from __future__ import annotations
 
 import numpy as np
 
+# Distance from a center, in texels, within which a position is that center. Larger: values of neighbors get lost.
+MAX_ROUNDING = 1e-6
+
 
 def sample_positions(count: int) -> list[tuple[float, float]]:
     """Centers of the `count` x `count` equal parts of a texel, across and up, in texels."""
@@ -19,6 +22,8 @@ def bilinear(
     values: np.ndarray, columns: np.ndarray, rows: np.ndarray, across: str = "EXTEND", along: str = "EXTEND"
 ) -> np.ndarray:
     """Values (N, C) of an image (H, W, C) at positions (N,); `across` and `along` extend its columns and rows."""
+    if _are_centers(columns) and _are_centers(rows):  # as of a panorama in its image's frame, in a third of the time
+        return nearest(values, columns, rows, across, along)
     sides = _neighbors(columns, values.shape[1], across)
     lines = (
         sum(values[row, column] * part[:, None] for column, part in sides) * weight[:, None]
@@ -68,6 +73,11 @@ def _neighbors(positions: np.ndarray, count: int, extension: str) -> list[tuple[
     return [
         (_index(texels, count, extension), weights * _is_inside(texels, count, extension)) for texels, weights in pairs
     ]
+
+
+def _are_centers(positions: np.ndarray) -> bool:
+    """True if all positions are centers of texels, but for rounding."""
+    return bool((np.abs(positions - np.floor(positions) - 0.5) < MAX_ROUNDING).all())
 
 
 def _is_inside(texels: np.ndarray, count: int, extension: str) -> np.ndarray:

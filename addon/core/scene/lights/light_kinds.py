@@ -255,6 +255,9 @@ class WorldLight(Light):
 
         def means() -> np.ndarray:
             radiance = np.ascontiguousarray(self.radiance, np.float32)
+            if radiance.shape[0] % step == radiance.shape[1] % step == 0:  # sums of slices take a tenth of the time
+                slices = (radiance[row::step, column::step] for row in range(step) for column in range(step))
+                return sum(slices) / np.float32(step**2)
             for axis in (0, 1):
                 edges = np.arange(0, radiance.shape[axis], step)
                 counts = np.diff([*edges, radiance.shape[axis]]).astype(np.float32)
