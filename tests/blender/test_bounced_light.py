@@ -70,6 +70,7 @@ def compare(floor, samples=SAMPLES, mean=0.01, block=0.05):
     )
     np.testing.assert_allclose(ours.mean(axis=(0, 1)), truth.mean(axis=(0, 1)), rtol=mean)
     np.testing.assert_allclose(ours, truth, atol=block * truth.mean())
+    return ours, truth
 
 
 def principled(name="Principled", **inputs):
@@ -104,7 +105,9 @@ def painted(color, name):
 
 
 def test_a_closed_room_of_coloured_walls():
-    compare(add_room())
+    """Blocks of 4 x 4 texels are 1 % off on average; noise of both is less than half of that."""
+    ours, truth = compare(add_room(), block=0.03)
+    assert np.abs(ours - truth).mean() < 0.01 * truth.mean()
 
 
 def test_a_room_of_principled_walls():
