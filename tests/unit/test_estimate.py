@@ -6,7 +6,7 @@ from dataclasses import replace
 import pytest
 from beamspread import Medium
 from beamspread.core.bake import steps
-from beamspread.core.bake.estimate import Workload, channels_of, simulation_seconds
+from beamspread.core.bake.estimate import Workload, channels_of, parallel_seconds, simulation_seconds
 from beamspread.core.bake.forecast import Finders, Forecast, seconds_of, steps_of_bakes
 from beamspread.core.bake.pace import Estimate, Pace, pace
 from beamspread.core.bake.spread_light import MIN_RAYS
@@ -205,3 +205,17 @@ def test_simulations_of_slabs_take_as_long_as_measured():
         medium = Medium(0.8, 1.4, thickness)
         estimate = simulation_seconds([medium], one_thread) / len(angles_for(medium))
         assert seconds / 1.7 < estimate < seconds * 1.7
+
+
+def test_light_in_a_texture_takes_its_time_only_where_it_scatters():
+    plain, scattering = (seconds_of(forecast(scatters=is_so).steps(SETTINGS)) for is_so in (False, True))
+    # 17 to 48 microseconds of a thread for each texel, as CPU seconds of whole bakes of two examples.
+    texels = 256**2
+    assert 17e-6 * texels < (scattering - plain) * parallel_speed() < 48e-6 * texels
+    own = replace(SETTINGS, distributions="angular")
+    assert seconds_of(forecast(scatters=True).steps(own)) == seconds_of(forecast().steps(own))
+
+
+def parallel_speed():
+    """Speed of all threads that the settings ask for, relative to one."""
+    return 1 / parallel_seconds(1.0, SETTINGS.threads)

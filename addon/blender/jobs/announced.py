@@ -195,7 +195,8 @@ class _SceneFacts:
             around=self._around(target, None if shape.is_bent else grid) if is_below else Surroundings(),
         )
         surface = replace(surface, base_color=PLACEHOLDER_COLOR) if is_textured else surface
-        rest = finders, self.unknown, shape.is_bent, shape.pieces
+        scatters = is_textured and target.node.texture_use().is_scattered
+        rest = finders, self.unknown, shape.is_bent, shape.pieces, scatters
         grids = [grid_of_bent(grid, shape) if shape.is_bent else grid]
         return Forecast(obj.name, grids, self.lights, self.triangles, surface, *rest)
 

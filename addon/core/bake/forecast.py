@@ -17,6 +17,7 @@ from .estimate import (
     cycles_color_seconds,
     cycles_light_seconds,
     simulation_seconds,
+    textured_seconds,
     workloads_of,
 )
 from .pace import Estimate
@@ -24,6 +25,7 @@ from .spread_light import has_back
 from .steps import Solve, needs_medium, to_simulate
 from .surface import Surface
 from .surroundings import OPEN, Surroundings, bounced_seconds, bounced_seconds_of_cycles
+from .textured_bake import why_multiplied
 
 
 @dataclass(frozen=True)
@@ -60,6 +62,7 @@ class Forecast:
     unknown : fraction of all light, about, that is not among the lights, besides that which Cycles finds.
     is_bent : True if the receiver is a mesh that bends.
     pieces : into which its texels are divided, on average, if it bends and the grids don't tell; see `Workload`.
+    scatters : True if light scatters in a texture's albedos.
     """
 
     name: str
@@ -71,6 +74,7 @@ class Forecast:
     unknown: float = 0.0
     is_bent: bool = False
     pieces: float = 0.0
+    scatters: bool = False
 
     def steps(self, settings: BakeSettings) -> list[Estimate]:
         """Estimates of the steps, without the simulation of media."""
@@ -93,6 +97,8 @@ class Forecast:
         loads = workloads_of(self.grids, self.lights, self.triangles, self.surface, settings, bounced, unknown)
         known = {"is_bent": self.is_bent, **({"pieces": self.pieces} if self.pieces else {})}
         seconds = sum(replace(load, **known).seconds(settings) for load in loads)
+        if self.scatters and not why_multiplied(settings):
+            seconds += textured_seconds(texels, threads, self.is_bent)
         steps.append((Solve.kind_for(settings), seconds))
         return [Estimate(kind, self.name, seconds) for kind, seconds in steps]
 

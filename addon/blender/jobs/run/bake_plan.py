@@ -106,7 +106,8 @@ class BakePlan:
             around=self._around(grids, light, len(light.by_cycles) > lamps) if bounced else Surroundings(),
         )
         facts = light.lights, light.triangle_count, self.surface_with_color(), finders
-        return Forecast(name, grids, *facts, is_bent=self.mesh.is_bent)
+        scatters = self.color is not None and self.use is not None and self.use.is_scattered
+        return Forecast(name, grids, *facts, is_bent=self.mesh.is_bent, scatters=scatters)
 
     def _around(self, grids: list[AnyGrid], light: Illumination, has_unknown_sky: bool) -> Surroundings:
         """Surroundings of the receiver; by boxes around objects where rays would keep the window waiting."""
