@@ -16,7 +16,7 @@ namespace {
 constexpr double same_pitch = 1e-4;
 
 // Fraction of the power of a kernel that may lie beyond the gaps. Larger: smaller gaps, light of one patch on another.
-constexpr double max_beyond = 1e-4;
+constexpr double max_beyond = 3e-4;
 
 // Angle of incidence, degrees, at which unscattered light of a slab reaches far.
 constexpr double grazing = 85.0;
@@ -27,7 +27,7 @@ constexpr double min_taper = 28.0;
 constexpr double taper = 0.125;
 
 // Gaps from which on a coarse grid is worth it, and what it needs besides, texels.
-constexpr double wide_gap = 111.0;
+constexpr double wide_gap = 256.0;
 constexpr double beside_gap = 32.0;
 
 // Patches that are worth a canvas: their number, and texels of one, or its area with gaps relative to its own. Larger
@@ -128,6 +128,7 @@ Canvas::Canvas(std::span<const Patch> unplaced, std::size_t side, const Plane& g
         plane.width = std::max(plane.width, x + width);
         plane.height = std::max(plane.height, y + height);
         x += width + gap_x;
+        plane.parts.push_back({.y = patch.y, .x = patch.x, .height = height, .width = width});
     }
 }
 

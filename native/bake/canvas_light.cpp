@@ -12,6 +12,15 @@ namespace {
 // Directions of a sun on patches with a kernel of their own each. More: more transforms, fewer choices of terms.
 constexpr std::size_t max_directions = 8;
 
+// Distance of two unit vectors that count as one direction: the frames of parallel planes differ by rounding of their
+// corners and UVs. Larger: fewer transforms, kernels off by some times as much.
+constexpr double same_direction = 3e-5;
+
+bool are_same(const Vec3& a, const Vec3& b)
+{
+    return glm::distance(a, b) <= same_direction;
+}
+
 // Adds light to a sum over all patches, whose direction to[i] is direction i of the light.
 void add_products(const SmoothLight& light, const std::vector<std::size_t>& to, double share, SmoothLight& sum)
 {
@@ -77,7 +86,7 @@ std::optional<Directions> CanvasLight::directions() const
         if (!directions || !std::holds_alternative<OneDirection>(*directions))
             return true;
         const Vec3 of_part = std::get<OneDirection>(*directions).travel;
-        return of_part != travel.emplace(travel.value_or(of_part));
+        return !are_same(of_part, travel.emplace(travel.value_or(of_part)));
     });
     return differ ? std::nullopt : std::optional<Directions>(OneDirection{*travel});
 }
@@ -94,8 +103,8 @@ std::vector<std::pair<OneDirection, std::vector<std::size_t>>> CanvasLight::para
         if (!directions || !std::holds_alternative<OneDirection>(*directions))
             return {};
         const OneDirection& direction = std::get<OneDirection>(*directions);
-        const auto same =
-            std::ranges::find_if(groups, [&](const auto& group) { return group.first.travel == direction.travel; });
+        const auto same = std::ranges::find_if(
+            groups, [&](const auto& group) { return are_same(group.first.travel, direction.travel); });
         if (same != groups.end())
             same->second.push_back(i);
         else if (groups.size() == max_directions)

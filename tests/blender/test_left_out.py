@@ -34,17 +34,17 @@ def add_instances():
     return [scenes.add_instancer(outer, name="Instance of Outer") for _ in range(2)][1]
 
 
-def add_curve():
-    curve = bpy.data.objects.new("Spline", bpy.data.curves.new("Spline", "CURVE"))
-    curve.data.materials.append(scenes.add_material())
-    bpy.context.scene.collection.objects.link(curve)
-    return curve
+def add_metaball():
+    ball = bpy.data.objects.new("Ball", bpy.data.metaballs.new("Ball"))
+    ball.data.materials.append(scenes.add_material())
+    bpy.context.scene.collection.objects.link(ball)
+    return ball
 
 
 MISPLACED = [
     (add_grouped, "Grouped", ["'Grouped' has one image, but its node group 'Outer'", "Ctrl Alt G"]),
     (add_instances, "Shown", ["'Shown' has 2 instances", "Make Instances Real", "Make Single User"]),
-    (add_curve, "Spline", ["'Spline' is not a mesh", "Convert"]),
+    (add_metaball, "Ball", ["'Ball' is not a mesh", "Convert"]),
 ]
 
 

@@ -17,11 +17,11 @@ def statuses() -> dict:
     return {str(target): row.status for target, row in state.rows.items()}
 
 
-def text_with(material):
-    curve = bpy.data.curves.new("Text", "FONT")
-    curve.body = "Wax"
-    curve.materials.append(material)
-    obj = bpy.data.objects.new("Text", curve)
+def metaball_with(material):
+    data = bpy.data.metaballs.new("Ball")
+    data.elements.new()
+    data.materials.append(material)
+    obj = bpy.data.objects.new("Ball", data)
     bpy.context.collection.objects.link(obj)
     return obj
 
@@ -79,20 +79,20 @@ def test_slots_of_one_object_are_told_apart():
 
 
 @pytest.mark.parametrize("is_baked", [False, True])
-def test_text_is_named(is_baked):
+def test_a_metaball_is_named(is_baked):
     material = add_material()
-    plane, text = add_plane(material=material), text_with(material)
+    plane, ball = add_plane(material=material), metaball_with(material)
     if is_baked:
         bake(plane)
     select(plane)
     said = panel()
-    assert "Text: Can't be baked" in said
-    assert "'Text' is not a mesh. Convert it to one" in said
-    select(text)
-    with pytest.raises(RuntimeError, match="'Text' is not a mesh"):
+    assert "Ball: Can't be baked" in said
+    assert "'Ball' is not a mesh. Convert it to one" in said
+    select(ball)
+    with pytest.raises(RuntimeError, match="'Ball' is not a mesh"):
         bpy.ops.beamspread.bake()
-    text.hide_render = True
-    assert "Text: Can't be baked" not in panel()
+    ball.hide_render = True
+    assert "Ball: Can't be baked" not in panel()
 
 
 @pytest.mark.parametrize("selected", [False, True])

@@ -19,7 +19,7 @@ def colors(request, scene, _progress) -> dict:
     samples beyond a triangle back to it.
     """
     obj, material = made_real(scene, request["object"], request["matrix"]), bpy.data.materials[request["material"]]
-    obj = selectable(scene, obj)
+    obj = selectable(scene, obj if obj.type == "MESH" else as_mesh(scene, obj, request["uv_map"]))
     if request["uv_map"] and request["uv_map"] not in obj.data.uv_layers:
         apply_modifiers(obj, request["uv_map"])
     copied = material.copy()  # a linked material can't be changed
@@ -48,7 +48,28 @@ def colors(request, scene, _progress) -> dict:
 
 
 def apply_modifiers(obj, uv_map: str) -> None:
-    """Give an object its evaluated mesh: Blender bakes to maps of the mesh itself, and a modifier may make this one.
+    """Give an object its evaluated mesh: Blender bakes to maps of the mesh itself, and a modifier may make this one."""
+    mesh = evaluated_mesh(obj, uv_map)
+    obj.modifiers.clear()
+    obj.data = mesh
+    bpy.context.view_layer.update()
+
+
+def as_mesh(scene, obj, uv_map: str):
+    """An object with the evaluated mesh of a curve or text, which Blender itself can't bake; hides the original."""
+    mesh, materials = evaluated_mesh(obj, uv_map), [slot.material for slot in obj.material_slots]
+    mesh.materials.clear()
+    for material in materials:
+        mesh.materials.append(material)
+    new = bpy.data.objects.new(f"{obj.name} to bake", mesh)
+    scene.collection.objects.link(new)
+    set_transform(scene, new, obj.matrix_world)
+    obj.hide_render = True
+    return new
+
+
+def evaluated_mesh(obj, uv_map: str):
+    """A copy of an object's evaluated mesh, with a UV map of that name that a modifier may make.
 
     Blender 3.4 has it as an attribute of vectors.
     """
@@ -64,9 +85,7 @@ def apply_modifiers(obj, uv_map: str) -> None:
         mesh.attributes.remove(attribute)
         layer = mesh.uv_layers.new(name=uv_map, do_init=False)
         layer.data.foreach_set("uv", np.ascontiguousarray(vectors.reshape(-1, 3)[:, :2]).ravel())
-    obj.modifiers.clear()
-    obj.data = mesh
-    bpy.context.view_layer.update()
+    return mesh
 
 
 def moved_map(mesh, name: str, corner) -> str:
@@ -101,14 +120,21 @@ def made_real(scene, name, matrix):
     obj.name = f"{name} to bake"
     obj.animation_data_clear()
     obj.constraints.clear()
-    # Instances may be sheared, and so may the inverse of a parent, but not an object itself.
-    obj.parent = bpy.data.objects.new("Transform", None)
-    scene.collection.objects.link(obj.parent)
-    obj.parent_type, obj.matrix_parent_inverse, obj.matrix_basis = "OBJECT", Matrix(matrix), Matrix()
+    set_transform(scene, obj, matrix)
     for delta in ("delta_location", "delta_rotation_euler"):
         setattr(obj, delta, (0, 0, 0))
     obj.delta_rotation_quaternion, obj.delta_scale = (1, 0, 0, 0), (1, 1, 1)
     return obj
+
+
+def set_transform(scene, obj, matrix) -> None:
+    """Give an object a transform to the world, which may be sheared as that of instances may be.
+
+    The inverse of a parent can be sheared, and an object itself can't.
+    """
+    obj.parent = bpy.data.objects.new("Transform", None)
+    scene.collection.objects.link(obj.parent)
+    obj.parent_type, obj.matrix_parent_inverse, obj.matrix_basis = "OBJECT", Matrix(matrix), Matrix()
 
 
 def selectable(scene, obj):

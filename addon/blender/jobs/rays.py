@@ -128,8 +128,15 @@ class Tracer:
 
         Each of few faces has several places.
         """
-        mesh, matrix = obj.data, np.array(obj.matrix_world)
-        if not len(mesh.polygons):
+        mesh = obj.to_mesh()  # curves and text have no faces themselves
+        try:
+            return self._places_on_mesh(obj, mesh, side)
+        finally:
+            obj.to_mesh_clear()
+
+    def _places_on_mesh(self, obj, mesh, side: float) -> tuple[np.ndarray, np.ndarray]:
+        matrix = np.array(obj.matrix_world)
+        if mesh is None or not len(mesh.polygons):
             return np.zeros((0, 3)), np.zeros((0, 3))
         turn = side * np.linalg.pinv(matrix[:3, :3]).T
         lift = LIFT * max(obj.dimensions)

@@ -52,7 +52,7 @@ class Shape:
 def shape_of(target: BakeTarget, depsgraph) -> Shape:
     """The shape of a target. Where a mesh is large, its length is that of the box around it, and it counts as bent."""
     obj, matrix = target.obj, target.obj.matrix_world
-    if len(obj.data.polygons) > MAX_FACES:
+    if len(getattr(obj.data, "polygons", ())) > MAX_FACES:  # curves and text have none themselves
         return Shape(max(obj.dimensions), True)
     evaluated, node = obj.evaluated_get(depsgraph), target.node
     is_tiled = uses_tiles(node, target.side)
@@ -97,8 +97,8 @@ def grid_of(target: BakeTarget, shape: Shape, resolution: int) -> Grid | None:
     obj, image = target.obj, target.image
     if is_sequence(image):
         return None
-    matrix, faces = obj.matrix_world, obj.data.polygons
-    # Modifiers may make the faces of a mesh that has none.
+    matrix, faces = obj.matrix_world, getattr(obj.data, "polygons", ())
+    # Modifiers may make the faces of a mesh that has none, and curves and text mostly lie in their plane z = 0.
     face_normal, middle = (faces[0].normal, faces[0].center) if len(faces) else (Vector((0, 0, 1)), _middle(obj))
     normal = matrix.to_3x3().inverted_safe().transposed() @ face_normal
     x_axis = matrix.to_3x3().col[0] if abs(face_normal.x) < 0.9 else matrix.to_3x3().col[1]

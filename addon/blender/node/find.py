@@ -13,7 +13,7 @@ from ...core.errors import BakeError
 from ...core.target import FRONT, Target
 from .. import compat
 from ..read.nodes import InputSocket
-from ..read.visibility import count_instances, render_visible_names, with_instanced
+from ..read.visibility import RECEIVER_TYPES, count_instances, render_visible_names, with_instanced
 from .node import BeamspreadNode, image_of_side
 from .output import is_linked
 
@@ -116,7 +116,7 @@ def _has_one_user(group) -> bool:
 
 def targets_of(obj) -> list[BakeTarget]:
     """The targets of an object: its materials that have a Beamspread node, each once for each side with an image."""
-    materials = _all_materials(obj) if obj.type == "MESH" else ()
+    materials = _all_materials(obj) if obj.type in RECEIVER_TYPES else ()
     places = ((material, find_node_in_groups(material)) for material in materials)
     found = [(material, *place) for material, place in places if place is not None]
     return [BakeTarget(obj, material, node, groups, side) for material, node, groups in found for side in node.sides()]
@@ -153,7 +153,7 @@ def rendered_counts(view_layer) -> dict[str, int]:
 def find_misplaced(objects: Iterable, with_images: bool = False) -> list[Bake]:
     """Failed bakes of Beamspread nodes that no bake can use, with the remedy.
 
-    A node with an image on an object without a mesh is left out, unless `with_images`: it was baked elsewhere.
+    A node with an image on an object that can't be baked is left out, unless `with_images`: it was baked elsewhere.
     """
     return [
         Bake(Target(obj.name, material.name), error=error)
@@ -171,7 +171,7 @@ def _misplaced(obj, with_images: bool) -> Iterator[tuple]:
     for material in _all_materials(obj):
         node = find_node(material)
         is_wanted = node is not None and (not any(node.shown_images()) or (with_images and material.library is None))
-        if is_wanted and obj.type != "MESH":
+        if is_wanted and obj.type not in RECEIVER_TYPES:
             yield material, BakeError(f"'{obj.name}' is not a mesh.", "Convert it to one (Object > Convert > Mesh).")
         if node is None and compat.uses_nodes(material):
             for _, groups in _nodes_in(material.node_tree):

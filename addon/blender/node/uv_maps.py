@@ -16,7 +16,7 @@ from ...core.scene.polygons import Polygons
 from ...core.scene.unwrap import unwrap, unwrap_together
 from ...core.target import Target
 from ..read.geometry import OWN_MAP, faces_with, polygons_of, read_polygons
-from ..read.visibility import find_instances
+from ..read.visibility import RECEIVER_TYPES, find_instances
 from .find import node_of, uses_tiles
 from .unwrap_group import NAME as MODIFIER
 from .unwrap_group import find_modifier, remove_modifier, set_uvs
@@ -43,7 +43,7 @@ def problems_of(depsgraph, targets: Iterable[Target]) -> dict[str, str]:
     instances = find_instances(depsgraph, {target.object_name for target in targets})
     for target in targets:
         instance = instances.get(target.object_name)
-        if instance is None or instance.obj.type != "MESH":
+        if instance is None or instance.obj.type not in RECEIVER_TYPES:
             continue
         node = node_of(target)
         if getattr(node, "uv_map", ""):  # the artist has chosen one
@@ -97,8 +97,8 @@ def _users(mesh) -> int:
 
 def objects_with_maps() -> set[str]:
     """Names of all objects that have a map of our own, or the modifier that makes it."""
-    meshes = (obj for obj in bpy.data.objects if obj.type == "MESH")
-    return {obj.name for obj in meshes if OWN_MAP in obj.data.uv_layers or find_modifier(obj)}
+    objects = (obj for obj in bpy.data.objects if obj.type in RECEIVER_TYPES)
+    return {obj.name for obj in objects if OWN_MAP in getattr(obj.data, "uv_layers", ()) or find_modifier(obj)}
 
 
 def _make(depsgraph, name: str, targets: list[Target], problem: str) -> Outcome:
@@ -130,7 +130,9 @@ def _make(depsgraph, name: str, targets: list[Target], problem: str) -> Outcome:
 
 
 def _keeps_faces(depsgraph, obj) -> bool:
-    """True if the modifiers of an object make no faces."""
+    """True if an object is a mesh, and its modifiers make no faces."""
+    if obj.type != "MESH":
+        return False
     evaluated = obj.evaluated_get(depsgraph)
     copy = evaluated.to_mesh()
     try:

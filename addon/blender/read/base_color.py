@@ -98,7 +98,10 @@ def read_base_color(
 
 
 def _uv_map(obj) -> str:
-    return next((layer.name for layer in obj.data.uv_layers if layer.active_render), "")
+    try:
+        return next((layer.name for layer in obj.to_mesh().uv_layers if layer.active_render), "")
+    finally:
+        obj.to_mesh_clear()
 
 
 def _color(evaluator: Evaluator, wanted: InputSocket, shape: tuple[int, int]) -> np.ndarray:

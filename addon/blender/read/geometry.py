@@ -26,6 +26,14 @@ from .transparency import MaterialTransmittance, transmittance_of
 OWN_MAP = "Beamspread"
 """Name of UV maps that bakes make."""
 
+NO_FACES_REMEDY = {
+    "MESH": "Fill its edges (Edit Mode: A, then F), or check modifiers.",
+    "CURVE": "Fill it, or give it depth (Object Data Properties > Shape > Fill Mode, Geometry > Bevel).",
+    "SURFACE": "Add control points in both directions, or check modifiers.",
+    "FONT": "Type some text (Edit Mode), or choose another Fill Mode (Object Data Properties > Shape).",
+}
+"""Remedy by the type of an object without faces."""
+
 INFINITE_MATRIX = "Its location, rotation or scale is infinite or not a number."
 MATRIX_REMEDY = "Clear it (Object > Clear), and check constraints and drivers."
 
@@ -212,7 +220,7 @@ def _transform(points: np.ndarray, matrix) -> np.ndarray:
 
 
 def read_polygons(obj, material_name: str, matrix=None, uv_map: str = "", is_tiled: bool = False) -> Polygons:
-    """Faces of an evaluated mesh object that carry the material, in world space.
+    """Faces of an evaluated object that carry the material, in world space.
 
     Parameters
     ----------
@@ -228,17 +236,16 @@ def read_polygons(obj, material_name: str, matrix=None, uv_map: str = "", is_til
         face crosses the border of a tile.
     """
     matrix = obj.matrix_world if matrix is None else matrix
-    _check_memory(obj)
+    _check_memory(obj, obj.data)
 
     def placed(polygons: Polygons) -> Polygons:
         return in_tiles(polygons, obj.name) if is_tiled else polygons
 
     mesh = obj.to_mesh()
     try:
-        if not len(mesh.polygons):
-            raise ReceiverError(
-                f"'{obj.name}' has no faces.", "Fill its edges (Edit Mode: A, then F), or check modifiers."
-            )
+        if mesh is None or not len(mesh.polygons):
+            raise ReceiverError(f"'{obj.name}' has no faces.", NO_FACES_REMEDY.get(obj.type, NO_FACES_REMEDY["MESH"]))
+        _check_memory(obj, mesh)
         chosen = faces_with(obj, mesh, {material_name})
         if uv_map:
             uvs = _uvs_by_name(obj, mesh, uv_map)
@@ -261,13 +268,16 @@ def _renders(mesh, name: str) -> bool:
     return any(layer.active_render and layer.name == name for layer in mesh.uv_layers)
 
 
-def _check_memory(obj) -> None:
-    """Raise ReceiverError if the faces of a mesh object would take more memory than the limit, or than there is."""
-    count, limit = len(obj.data.loops), memory_limit() or machine_bytes()
+def _check_memory(obj, data) -> None:
+    """Raise ReceiverError if the faces of an object would take more memory than the limit, or than there is.
+
+    `data` is its mesh; curves and text have none until it is made.
+    """
+    count, limit = len(getattr(data, "loops", ())), memory_limit() or machine_bytes()
     needed = BYTES_PER_CORNER * count
     if limit and needed > limit:
         text = (
-            f"The {len(obj.data.polygons)} faces of '{obj.name}' take about {needed / 2**30:.1f} GB of memory, and "
+            f"The {len(data.polygons)} faces of '{obj.name}' take about {needed / 2**30:.1f} GB of memory, and "
             f"{limit / 2**30:.1f} GB are allowed."
         )
         remedy = "Simplify the mesh (modifier Decimate), or raise the memory limit in the add-on's preferences."

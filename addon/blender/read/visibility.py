@@ -7,6 +7,7 @@ from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 
+import bpy
 from mathutils import Matrix
 
 from ...core.errors import BakeError
@@ -16,6 +17,9 @@ from .. import compat
 # Types of objects whose surfaces become meshes, and of all objects that light bounces from.
 SURFACE_TYPES = {"MESH", "CURVE", "SURFACE", "FONT", "META"}
 SOLID_TYPES = SURFACE_TYPES | {"CURVES", "VOLUME", "POINTCLOUD"}
+
+# Types of objects that are baked. A modifier can give the meshes of curves and text a UV map, but not metaballs.
+RECEIVER_TYPES = {"MESH", "CURVE", "SURFACE", "FONT"}
 
 # Types of objects that no bake knows, with their names for artists.
 UNKNOWN_TYPES = {"CURVES": "hair", "POINTCLOUD": "a point cloud", "VOLUME": "a volume"}
@@ -146,6 +150,21 @@ def as_rendered(view_layer):
             set_value(modifier, "show_viewport", modifier.show_render)
             if modifier.type == "SUBSURF":
                 set_value(modifier, "levels", modifier.render_levels)
+        show_resolution(obj.data)
+
+    def show_resolution(data) -> None:
+        if not isinstance(data, bpy.types.Curve) or data.library is not None:
+            return
+        for name in ("resolution_u", "resolution_v"):
+            rendered = getattr(data, f"render_{name}")
+            if rendered:  # 0: that of the window
+                # Blender gives a curve's value to its splines: these are restored after it.
+                splines = [spline for spline in data.splines if getattr(spline, name) != rendered]
+                restore.extend((spline, name, getattr(spline, name)) for spline in splines)
+                restore.append((data, name, getattr(data, name)))
+                setattr(data, name, rendered)
+                for spline in splines:
+                    setattr(spline, name, rendered)
 
     def update_collections() -> None:
         # Instanced collections notice only by a tag that an object in them was hidden or shown.

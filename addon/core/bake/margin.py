@@ -103,41 +103,51 @@ def _beside(mask: np.ndarray, steps: Sequence[tuple[int, int]]) -> np.ndarray:
 
 def add_rings(texture: np.ndarray, known: np.ndarray, count: int, labels: np.ndarray | None = None) -> np.ndarray:
     """A copy with `count` rings around the known texels filled; a texel with a label continues that island alone."""
-    # A frame of unknown texels makes border checks unnecessary.
+    # A frame of unknown texels makes border checks unnecessary. Texels have numbers, row by row.
     result = np.pad(texture.astype(np.float32, copy=False), ((1, 1), (1, 1), (0, 0)))
     filled = np.pad(known, 1)
-    label_of = np.zeros((1, 1), np.int32) if labels is None else np.pad(labels, 1, constant_values=NO_ISLAND)
-    rows, columns = np.nonzero(_touched(filled))
+    height, width, channels = result.shape
+    values, is_filled = result.reshape(-1, channels), filled.reshape(-1)
+    label_of = None if labels is None else np.pad(labels, 1, constant_values=NO_ISLAND).reshape(-1)
+    texels = np.flatnonzero(_touched(filled))
+    is_inner = np.zeros((height, width), bool)
+    is_inner[1:-1, 1:-1] = True
     for _ in range(count):
-        if not len(rows):
+        if not len(texels):
             break
-        chosen = None if labels is None else _chosen(label_of, filled, rows, columns)
-        weight, total = np.zeros((len(rows), 1), np.float32), np.zeros((len(rows), result.shape[2]), np.float32)
-        for dy, dx in NEIGHBOURS:
-            counts = filled[rows + dy, columns + dx, None]
+        chosen = None if label_of is None else _chosen(label_of, is_filled, texels, width)
+        weight, total = np.zeros((len(texels), 1), np.float32), np.zeros((len(texels), channels), np.float32)
+        for step in _numbers(NEIGHBOURS, width):
+            beside = texels + step
+            counts = is_filled[beside]
             if chosen is not None:
-                counts = counts & (label_of[rows + dy, columns + dx] == chosen)[:, None]
-            weight += counts
-            total += np.where(counts, result[rows + dy, columns + dx], 0)
+                counts &= label_of[beside] == chosen
+            weight += counts[:, None]
+            total += np.where(counts[:, None], values.take(beside, axis=0), np.float32(0))
         is_known = weight[:, 0] > 0
-        known_rows, known_columns = rows[is_known], columns[is_known]
-        result[known_rows, known_columns] = total[is_known] / weight[is_known]
-        filled[known_rows, known_columns] = True
+        found = texels[is_known]
+        values[found] = total[is_known] / weight[is_known]
+        is_filled[found] = True
         if chosen is not None:
-            label_of[known_rows, known_columns] = chosen[is_known]
-        rows, columns = _around(filled, rows, columns)
+            label_of[found] = chosen[is_known]
+        texels = _around(is_filled, is_inner.reshape(-1), texels, width)
     return result[1:-1, 1:-1]
 
 
-def _chosen(label_of: np.ndarray, filled: np.ndarray, rows: np.ndarray, columns: np.ndarray) -> np.ndarray:
+def _numbers(steps: Sequence[tuple[int, int]], width: int) -> list[int]:
+    """Differences of the numbers of texels that are these steps apart."""
+    return [dy * width + dx for dy, dx in steps]
+
+
+def _chosen(label_of: np.ndarray, is_filled: np.ndarray, texels: np.ndarray, width: int) -> np.ndarray:
     """Label of the island that each texel continues: its own, else the lowest straight beside it, else diagonally."""
-    chosen = label_of[rows, columns]
+    chosen = label_of[texels]
     for steps in (STRAIGHT, DIAGONAL):
-        lowest = np.full(len(rows), NO_ISLAND, np.int32)
-        for dy, dx in steps:
-            beside = np.where(filled[rows + dy, columns + dx], label_of[rows + dy, columns + dx], NO_ISLAND)
-            lowest = np.minimum(lowest, beside)
-        chosen = np.where(chosen == NO_ISLAND, lowest, chosen)
+        lowest = np.full(len(texels), NO_ISLAND, np.int32)
+        for step in _numbers(steps, width):
+            beside = texels + step
+            np.minimum(lowest, label_of[beside], out=lowest, where=is_filled[beside])
+        np.copyto(chosen, lowest, where=chosen == NO_ISLAND)
     return chosen
 
 
@@ -148,11 +158,9 @@ def _touched(filled: np.ndarray) -> np.ndarray:
     return near & ~filled
 
 
-def _around(filled: np.ndarray, rows: np.ndarray, columns: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """The unknown texels beside the given ones, without the frame."""
-    height, width = filled.shape
-    numbers = np.unique(np.concatenate([(rows + dy) * width + columns + dx for dy, dx in NEIGHBOURS]))
-    rows, columns = np.divmod(numbers, width)
-    inside = (rows > 0) & (rows < height - 1) & (columns > 0) & (columns < width - 1)
-    wanted = inside & ~filled[rows, columns]
-    return rows[wanted], columns[wanted]
+def _around(is_filled: np.ndarray, is_inner: np.ndarray, texels: np.ndarray, width: int) -> np.ndarray:
+    """Numbers of the unknown texels beside the given ones, without the frame, in their order."""
+    is_beside = np.zeros(len(is_filled), bool)  # faster than sorting the numbers
+    for step in _numbers(NEIGHBOURS, width):
+        is_beside[texels + step] = True
+    return np.flatnonzero(is_beside & is_inner & ~is_filled)

@@ -11,6 +11,14 @@
 
 namespace beamspread {
 
+// Rectangle of texels.
+struct PlanePart {
+    std::size_t y = 0;
+    std::size_t x = 0;
+    std::size_t height = 0;
+    std::size_t width = 0;
+};
+
 // A plane of texels. Texel (0, 0) lies at the origin of the plane frame: x runs along rows, y from row to row, z
 // outward. The plane may consist of rectangular parts with dark gaps between them, which light does not cross.
 struct Plane {
@@ -20,6 +28,7 @@ struct Plane {
     double pitch_y = 1.0;
     double extent = 0.0;  // largest distance of two texels of a part, metres; 0: the plane is one part
     double gap = 0.0;     // least distance of texels of different parts, metres
+    std::vector<PlanePart> parts{};  // outside of these no luminance is wanted; empty: the plane is one part
 
     std::size_t texels() const { return width * height; }
 };

@@ -153,7 +153,7 @@ SpectraAtOnce spectra_at_once(const PaddedPlane& plane, std::size_t terms, std::
 
 Levels choose_levels(const Plane& plane, const std::vector<ScaledProfile>& profiles, const LevelChoice& choice)
 {
-    const auto [width, height, pitch_x, pitch_y, extent, gap] = plane;
+    const auto& [width, height, pitch_x, pitch_y, extent, gap, parts] = plane;
     Level single{{width, height, pitch_x, pitch_y}, KernelCentre{}, std::nullopt};
     const double unit = single.plane.unit();
     double cut = 0.0;

@@ -28,24 +28,54 @@ constexpr std::array<std::size_t, 4> extreme_reach = {0, site_reach / 2, 3 * sit
 // Largest distance, in texels, of `sites_around`.
 constexpr std::size_t around_reach = 3 * site_reach / 2;
 
+// Sites on the parts of a plane: in the gaps between these, which are dark, no luminance is wanted.
 class Sites {
 public:
-    Sites(const Plane& plane, std::size_t stream) : m_plane(plane), m_random(0, stream, 0) {}
+    Sites(const Plane& plane, std::size_t stream) : m_parts(plane.parts), m_random(0, stream, 0)
+    {
+        if (m_parts.empty())
+            m_parts.push_back({.height = plane.height, .width = plane.width});
+        for (const PlanePart& part : m_parts)
+            m_ends.push_back((m_ends.empty() ? 0 : m_ends.back()) + part.height * part.width);
+    }
 
-    Texel anywhere() { return {below(m_plane.height), below(m_plane.width)}; }
+    // The part with a texel; null in a gap.
+    const PlanePart* part_of(const Texel& texel) const
+    {
+        const auto part = std::ranges::find_if(m_parts, [&](const PlanePart& part) {
+            return texel.y - part.y < part.height && texel.x - part.x < part.width;  // unsigned
+        });
+        return part == m_parts.end() ? nullptr : &*part;
+    }
 
+    Texel anywhere()
+    {
+        if (m_parts.size() == 1)
+            return {m_parts.front().y + below(m_parts.front().height),
+                    m_parts.front().x + below(m_parts.front().width)};
+        const std::size_t texel = below(m_ends.back());
+        const auto end = std::ranges::upper_bound(m_ends, texel);
+        const PlanePart& part = m_parts[static_cast<std::size_t>(end - m_ends.begin())];
+        const std::size_t in_part = texel + part.height * part.width - *end;
+        return {part.y + in_part / part.width, part.x + in_part % part.width};
+    }
+
+    // A texel of the same part.
     Texel near(const Texel& texel, std::size_t reach)
     {
-        return {near(texel.y, reach, m_plane.height), near(texel.x, reach, m_plane.width)};
+        const PlanePart& part = *part_of(texel);
+        return {part.y + near(texel.y - part.y, reach, part.height),
+                part.x + near(texel.x - part.x, reach, part.width)};
     }
 
     // Adds the middle, and one texel from each of the eight parts of the square around it.
     void add(const Texel& middle)
     {
+        const PlanePart& part = *part_of(middle);
         for (std::size_t i = 0; i < texels_per_site; ++i)
             m_texels.push_back(i == texels_per_site / 2 ? middle
-                                                        : Texel{within(middle.y, i / 3, m_plane.height),
-                                                                within(middle.x, i % 3, m_plane.width)});
+                                                        : Texel{part.y + within(middle.y - part.y, i / 3, part.height),
+                                                                part.x + within(middle.x - part.x, i % 3, part.width)});
     }
 
     std::vector<Texel> take() { return std::move(m_texels); }
@@ -71,7 +101,8 @@ private:
         return first + static_cast<std::size_t>(part * count);
     }
 
-    const Plane& m_plane;
+    std::vector<PlanePart> m_parts;
+    std::vector<std::size_t> m_ends;  // numbers of texels up to the end of each part
     Random m_random;
     std::vector<Texel> m_texels;
 };
@@ -128,7 +159,8 @@ std::vector<Texel> probe_sites(const LightTerms& light, const std::vector<std::s
     Sites sites(light.plane, 0);
     const Texel last{light.plane.height - 1, light.plane.width - 1};
     for (const Texel& corner : {Texel{0, 0}, Texel{0, last.x}, Texel{last.y, 0}, last})
-        sites.add(corner);
+        if (sites.part_of(corner))
+            sites.add(corner);
     std::vector<Texel> drawn;
     std::vector<float> sums;  // cumulative changes
     for (std::size_t i = 0; i < pairs; ++i) {
@@ -148,7 +180,8 @@ std::vector<Texel> probe_sites(const LightTerms& light, const std::vector<std::s
         if (extremes.irradiance == 0.0)
             continue;
         std::vector<Texel> texels = {extremes.brightest, extremes.steepest, extremes.most_grazing};
-        if (const std::optional<Texel> lamp = origin(light.plane, light.changing[l], drawn))
+        const std::optional<Texel> lamp = origin(light.plane, light.changing[l], drawn);
+        if (lamp && sites.part_of(*lamp))
             texels.push_back(*lamp);
         for (const Texel& texel : texels)
             for (const std::size_t reach : extreme_reach)
