@@ -149,6 +149,15 @@ def group_input(modifier, name: str):
     return modifier.get(identifier)
 
 
+def move_modifier(obj, modifier, index: int) -> None:
+    """Give a modifier of an object a place among its modifiers."""
+    if hasattr(obj.modifiers, "move"):  # from Blender 3.5 on
+        obj.modifiers.move(list(obj.modifiers).index(modifier), index)
+        return
+    with bpy.context.temp_override(object=obj, active_object=obj):
+        bpy.ops.object.modifier_move_to_index(modifier=modifier.name, index=index)
+
+
 def set_group_input(modifier, name: str, value) -> None:
     """Set an input of a modifier's node group."""
     identifier = input_identifier(modifier.node_group, name)

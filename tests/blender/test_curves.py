@@ -192,7 +192,7 @@ def test_a_batch_bakes_text_and_saves_its_map(tmp_path):
 
 
 def test_live_follows_text():
-    text = add_text(extrude=0.1)
+    text = add_text()
     scenes.bake(text)
     bpy.context.scene.beamspread.use_live = True
     settle()

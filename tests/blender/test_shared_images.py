@@ -1,10 +1,14 @@
 """Surfaces that share an image: objects, materials of one mesh, planes. Each fills its own texels and margin."""
 
+from contextlib import nullcontext
+
 import bpy
 import numpy as np
 import pytest
 import scenes
+from beamspread.blender.images import files, waiting
 from beamspread.blender.jobs.state import state
+from beamspread.core.errors import ImageError
 from beamspread.core.native import native
 from live_scenes import live_pixels, shown_pixels, switch_off
 
@@ -218,3 +222,66 @@ def test_live_divides_the_texels_as_a_bake():
     switch_off()
     baked = scenes.bake(*planes)[0]
     np.testing.assert_allclose(live, baked, rtol=1e-4, atol=1e-6)
+
+
+def many_objects(image, count=4):
+    """Planes of one material side by side in the image."""
+    material, planes = scenes.add_material("Many", image=image, linked=True), []
+    for number in range(count):
+        left, right = ((number + part) / count for part in (0.1, 0.9))
+        uvs = np.array([(left, 0.1), (right, 0.1), (right, 0.9), (left, 0.9)])
+        planes.append(scenes.add_plane(f"P{number}", (0.2, 0.8), uvs=uvs, material=material))
+        planes[-1].location.x = 0.3 * number
+    bpy.context.view_layer.update()
+    return planes
+
+
+@pytest.mark.parametrize("kind", ["EXR file", "PNG file", "packed"])
+@pytest.mark.parametrize("last_fails", [False, True])
+def test_an_image_waits_for_its_last_object(kind, last_fails, tmp_path, monkeypatch):
+    """The first result is shown at once; the others come together, also if the last object has none."""
+    image = make_image(kind, tmp_path)
+    planes = many_objects(image)
+    if last_fails:
+        planes[-1].data.clear_geometry()
+    results, writes, fill = [], [], files.fill_image
+
+    def counted(*given):
+        writes.append(given)
+        return fill(*given)
+
+    for pause in (0.0, 1e9):
+        writes.clear()
+        monkeypatch.setattr(waiting, "PAUSE", pause)
+        monkeypatch.setattr(files, "fill_image", counted)
+        scenes.select(*planes)
+        failing = pytest.raises(RuntimeError, match="'P3' has no faces")
+        with failing if last_fails else nullcontext():
+            bpy.ops.beamspread.bake()
+        monkeypatch.undo()
+        count = len(planes) - last_fails
+        assert len(writes) == (count if pause == 0 else 2)
+        results.append(scenes.pixels(image))
+    np.testing.assert_array_equal(results[1], results[0])
+    for number in range(count):
+        middle = int((number + 0.5) / len(planes) * SIDE)
+        assert results[1][SIDE // 2, middle].max() > 0.01
+
+
+def test_results_that_can_no_longer_be_written_are_named(tmp_path, monkeypatch):
+    image = make_image("EXR file", tmp_path)
+    planes, fill, calls = many_objects(image), files.fill_image, []
+
+    def fail_at_last(*given):
+        calls.append(given)
+        if len(calls) > 1:
+            raise ImageError("The disk is full.")
+        return fill(*given)
+
+    monkeypatch.setattr(waiting, "PAUSE", 1e9)
+    monkeypatch.setattr(files, "fill_image", fail_at_last)
+    scenes.select(*planes)
+    with pytest.raises(RuntimeError, match="The disk is full") as caught:
+        bpy.ops.beamspread.bake()
+    assert all(f"P{number} / Many" in str(caught.value) for number in (1, 2, 3))
+    assert "P0 / Many" not in str(caught.value)

@@ -12,6 +12,7 @@ from beamspread.blender.jobs.state import state
 from beamspread.blender.node.tree import show_map
 from beamspread.blender.node.uv_maps import make_maps
 from beamspread.blender.read.geometry import OWN_MAP, read_polygons
+from beamspread.blender.read.visibility import as_rendered
 from beamspread.core.scene.islands import check_map
 from beamspread.core.target import Target
 from live_scenes import live_lines, live_pixels, settle, switch_off
@@ -166,6 +167,38 @@ def test_faces_that_modifiers_make_have_places_of_their_own(kind):
     scenes.select(box)
     assert bpy.ops.beamspread.bake() == {"FINISHED"}
     assert len(box.modifiers) == 2
+
+
+@pytest.mark.parametrize("kinds", [["SUBSURF"], ["ARRAY", "SUBSURF"], ["SUBSURF", "SUBSURF"]])
+def test_the_map_fits_all_levels_of_subdivision(kinds):
+    """Renders have more levels than the window. Each part of the surface has its place in the image in both."""
+    box = add_box(uvs=False)
+    for kind in kinds:
+        modifier = box.modifiers.new(kind, kind)
+        if kind == "ARRAY":
+            modifier.relative_offset_displace[0] = 1.5
+    assert modifier.levels < modifier.render_levels
+    scenes.bake(box)
+    names = [OWN_MAP in box.data.uv_layers, *box.modifiers.keys()]
+    expected = [False, "ARRAY", "Beamspread UV Map", "SUBSURF"] if "ARRAY" in kinds else [True, *box.modifiers.keys()]
+    assert names == expected
+
+    def middles():
+        evaluated = box.evaluated_get(bpy.context.evaluated_depsgraph_get())
+        polygons = read_polygons(evaluated, box.data.materials[0].name, evaluated.matrix_world)
+        assert polygons.uv_map == OWN_MAP
+        check_map(polygons)
+        means = [np.add.reduceat(values, polygons.starts[:-1]) for values in (polygons.uvs, polygons.corners)]
+        return [mean / np.diff(polygons.starts)[:, None] for mean in means]
+
+    in_window = middles()
+    with as_rendered(bpy.context.view_layer):
+        in_renders = middles()
+    assert len(in_renders[0]) >= 4 * len(in_window[0])
+    for uv, place in zip(*in_window):
+        nearest = np.linalg.norm(in_renders[0] - uv, axis=1).argmin()
+        # Faces of half the size, on a surface that is smoother: a cube of 1 has faces of .3 in the window.
+        assert np.linalg.norm(in_renders[1][nearest] - place) < 0.25
 
 
 def map_after_modifiers(obj):

@@ -22,12 +22,19 @@ from .facts import note_bake, owners_of, users_of, users_of_material
 from .new_image import name_for, separate_from_other_scene, store_new
 from .shared import Parts, Size, overlaps, parts_of, read_parts, texels_of
 from .udim import is_tiled
+from .waiting import Waiting
 
 
 class Results:
-    """Images that one run fills. Objects that share an image fill a part of it each."""
+    """Images that one run fills. Objects that share an image fill a part of it each.
+
+    Attributes
+    ----------
+    waiting : results that are not yet in their images, because others of the run follow.
+    """
 
     def __init__(self) -> None:
+        self.waiting = Waiting()
         self._planned: dict[str, list[Target]] = {}  # targets by the name of their image, in the order of the run
         self._maps: dict[Target, str | None] = {}  # as of `_map_of`
         self._parts: dict[tuple, Parts | None] = {}  # islands by target and size of the image
@@ -54,17 +61,19 @@ class Results:
         elif bake.job.receiver.tiling is not None:
             tiled.check_folder()
 
-    def store(self, bake: Bake) -> str:
+    def store(self, bake: Bake, others_follow: bool = False) -> str:
         """Fill the image of the target's node, or a new one, and show it; other layers have images of their own.
 
-        If the node's image holds the result of another target, the target gets a new image. Returns the path of the
-        file, "" if the image is packed.
+        If `others_follow`, bakes of the run that fill the same image, the result may wait for them: `waiting.write()`
+        has to come after the last one. If the node's image holds the result of another target, the target gets a new
+        image. Returns the path of the file, "" if the image is packed.
 
         Raises
         ------
         BakeError
             The result can't be stored.
         """
+        self.waiting.others_follow = others_follow
         layer, texture = bake.job.settings.layer, bake.texture
         node = _node(bake.target, layer)
         if layer != COMBINED:
@@ -84,11 +93,10 @@ class Results:
         if any(self._covers(owner, image, bake) for owner in owners):
             return None
         neighbors = self._neighbors(image, bake, owners, users)
-        if neighbors:
-            filled = texels_of(bake.target, bake.job.receiver, neighbors, bake.job.settings.margin)
-            texture = np.where(filled[..., None], texture, _pixels_of(image, bake))
-        tiling = bake.job.receiver.tiling
-        return files.fill_image(image, texture) if tiling is None else tiled.fill(image, texture, tiling)
+        if not neighbors:
+            return self.waiting.fill(image, bake, texture)
+        filled = texels_of(bake.target, bake.job.receiver, neighbors, bake.job.settings.margin)
+        return self.waiting.fill(image, bake, texture, filled)
 
     def fill_shown(self, image, bake: Bake, texture: np.ndarray) -> str | None:
         """Fill the bake's part of its node's image and record its owner; None if the part belongs to another."""
@@ -243,11 +251,6 @@ class Results:
 def _size_in(image, bake: Bake) -> Size:
     """Size of the texture that a bake fills in an image, or the tiles in it."""
     return bake.job.receiver.tiling or tuple(image.size)
-
-
-def _pixels_of(image, bake: Bake) -> np.ndarray:
-    tiling = bake.job.receiver.tiling
-    return files.linear_pixels(image) if tiling is None else tiled.linear_pixels(image, tiling)
 
 
 def _store_new(name: str, texture: np.ndarray, bake: Bake, is_data: bool = False) -> tuple[str, bpy.types.Image]:

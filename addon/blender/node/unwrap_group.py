@@ -20,8 +20,11 @@ SOURCE = "UVs"
 """Input of the node group: the object whose vertices are the UVs."""
 
 
-def set_uvs(obj, uvs: np.ndarray) -> None:
-    """Give the face corners of an object, after its modifiers, UVs (K, 2) by the modifier, which is its last one."""
+def set_uvs(obj, uvs: np.ndarray, before=None) -> None:
+    """Give the face corners of an object, after its modifiers, UVs (K, 2) by the modifier, which is its last one.
+
+    `before` is a modifier of the object that comes after it, None for none.
+    """
     # A new modifier tells Blender about its new source. A copy of an object shares the source until its faces differ.
     if find_modifier(obj) is not None:
         remove_modifier(obj)
@@ -31,6 +34,8 @@ def set_uvs(obj, uvs: np.ndarray) -> None:
     modifier = obj.modifiers.new(NAME, "NODES")
     modifier.node_group = next((tree for tree in bpy.data.node_groups if _is_group(tree)), None) or _make_group()
     compat.set_group_input(modifier, SOURCE, bpy.data.objects.new(NAME, mesh))
+    if before is not None:
+        compat.move_modifier(obj, modifier, list(obj.modifiers).index(before))
     obj.update_tag()
 
 

@@ -109,7 +109,10 @@ def _make(depsgraph, name: str, targets: list[Target], problem: str) -> Outcome:
         return ReceiverError(text, "Make it local (Object > Relations > Make Local > Selected Objects and Data).")
     if mesh.is_editmode:
         obj.update_from_editmode()
-    if _keeps_faces(depsgraph, obj):
+    before = _make_before_subdivision(depsgraph, obj, targets)
+    if before:
+        added = before
+    elif _keeps_faces(depsgraph, obj):
         # The data of a mesh in Edit Mode are empty.
         polygons = _evaluated_polygons(depsgraph, obj) if mesh.is_editmode else _mesh_polygons(obj)
         if not _fill_layer(mesh, unwrap(polygons).astype(np.float32)):
@@ -127,6 +130,50 @@ def _make(depsgraph, name: str, targets: list[Target], problem: str) -> Outcome:
             )
         added = f"'{name}' has a new modifier '{MODIFIER}', which makes the UV map '{OWN_MAP}' for its image."
     return note(name, f"{problem} So {added}")
+
+
+def _make_before_subdivision(depsgraph, obj, targets: list[Target]) -> str:
+    """Give a mesh whose last modifiers subdivide it a map of the faces before: it fits all levels of subdivision.
+
+    The window mostly shows fewer levels than renders. Returns a sentence about the map; "" if there is none.
+    """
+    last = _last_subdivisions(obj)
+    if obj.type != "MESH" or obj.data.is_editmode or not last:
+        return ""
+    for modifier in last:
+        modifier.show_viewport = False
+    depsgraph.update()
+    is_layer, had_layer = _keeps_faces(depsgraph, obj), OWN_MAP in obj.data.uv_layers
+    try:
+        if is_layer and not _fill_layer(obj.data, unwrap(_mesh_polygons(obj)).astype(np.float32)):
+            return ""
+        if not is_layer:
+            set_uvs(obj, unwrap(_evaluated_polygons(depsgraph, obj)), before=last[0])
+    finally:
+        for modifier in last:
+            modifier.show_viewport = True
+        depsgraph.update()
+    if obj.name in problems_of(depsgraph, [target for target in targets if target.object_name == obj.name]):
+        if not is_layer:
+            remove_modifier(obj)
+        elif not had_layer:
+            obj.data.uv_layers.remove(obj.data.uv_layers[OWN_MAP])
+        depsgraph.update()
+        return ""
+    if is_layer:
+        return f"'{obj.name}' has a new UV map '{OWN_MAP}', which its image uses."
+    return f"'{obj.name}' has a new modifier '{MODIFIER}', which makes the UV map '{OWN_MAP}' for its image."
+
+
+def _last_subdivisions(obj) -> list:
+    """Modifiers that subdivide an object after all others that are shown; our own does not count."""
+    last = []
+    for modifier in reversed(obj.modifiers):
+        if modifier.type == "SUBSURF" and modifier.show_viewport:
+            last.insert(0, modifier)
+        elif modifier.show_viewport and modifier != find_modifier(obj):
+            break
+    return last
 
 
 def _keeps_faces(depsgraph, obj) -> bool:

@@ -11,6 +11,7 @@ from functools import partial
 from ....core.bake.bake_settings import COMBINED, FINAL, PREVIEW, BakeSettings
 from ....core.bake.forecast import seconds_of, steps_of_bakes
 from ....core.bake.runner import CANCELLED, WRITTEN, Bake, Sink
+from ....core.errors import message_of
 from ....core.messages import Level, Message, Messages, warning
 from ....core.progress import Progress
 from ....core.target import Target
@@ -113,6 +114,7 @@ class BakeRun(Sink):
         for number, step in enumerate(self._steps, 1):
             self._number = number
             if step.purpose == Pass.FINAL and self._purpose == Pass.PREVIEW:
+                self._write_waiting()
                 self._results = Results()  # the same parts of the same images are filled again
             self._purpose = step.purpose
             yield self._results.admit(step.bake())
@@ -138,7 +140,16 @@ class BakeRun(Sink):
         return f"{self._number} of {len(self._steps)}" if len(self._steps) > 1 else ""
 
     def store(self, bake: Bake) -> str:
-        return self._results.store(bake)
+        key = _image_key(self._steps[self._number - 1].plan)
+        return self._results.store(bake, any(_image_key(step.plan) == key for step in self._steps[self._number :]))
+
+    def _write_waiting(self) -> None:
+        """Write the results that wait for others of their image."""
+        for target, error in self._results.waiting.write():
+            self.written = [other for other in self.written if other != target]
+            bake = Bake(target, error=error)
+            state.note(bake)
+            self.fail(message_of(error, str(target)))
 
     def end(self, bake: Bake) -> None:
         if bake.status == CANCELLED and self._purpose == Pass.FINAL:
@@ -162,6 +173,7 @@ class BakeRun(Sink):
 
     def close(self) -> None:
         """End the run, also after an error."""
+        self._write_waiting()
 
     def is_successful(self) -> bool:
         """True if the run has results."""
