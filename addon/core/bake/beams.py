@@ -13,12 +13,9 @@ from ..scene.illumination import Illumination
 from ..scene.lights import Light, WorldLight
 from ..scene.sampling import resized
 from .bake_settings import BakeSettings
-from .directions import Beams, Splitter
+from .directions import SURVEY_TEXELS, Beams, Splitter
 from .mean_light import MEAN_WORLD_ROWS
 from .spreading import Effort
-
-# Texels along a side at which directions of light are surveyed. More: slower, finer.
-SURVEY_TEXELS = 48
 
 # Cosine of the mean angle between a light's rays at a texel and their mean, from which they count as one direction.
 # Smaller: faster, and light that goes another way.

@@ -16,8 +16,8 @@ from numpy.typing import NDArray
 from ..material import Material
 from ..progress import Progress
 from ..scene.bent_grid import BentGrid
-from .beams import SURVEY_TEXELS, lights_before, rays_of, surveyed
-from .directions import Splitter
+from .beams import lights_before, rays_of, surveyed
+from .directions import SURVEY_TEXELS, Splitter
 from .planes_image import PlanesImage
 from .spreading import Spreading
 from .tangent_planes import CORE, Middle, Points, TangentPlane, middles_of, side_by_side

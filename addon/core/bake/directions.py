@@ -27,6 +27,9 @@ MAX_OWN = 3
 STEEP = 6.0
 """Angle from the normal, degrees, up to which azimuths do not count. Larger: fewer paths."""
 
+SURVEY_TEXELS = 48
+"""Texels along a side at which directions of light are surveyed. More: slower, finer."""
+
 DIGITS = 7
 """Digits of directions that count. More: last bits that depend on the C library of the process."""
 
@@ -112,7 +115,10 @@ def direction_of(power: NDArray, way: NDArray) -> NDArray | None:
 def beams_of(lights: Iterable[tuple[NDArray, NDArray]]) -> Beams:
     """Light of a few directions that stands for all lights: irradiance (H, W, 3), and directions (3,) or (H, W, 3)."""
     lights = list(lights)
-    surveys = [(light.sum(-1), np.broadcast_to(way, light.shape)) for light, way in lights]
+    surveys = []
+    for light, way in lights:
+        few = tuple(slice(None, None, max(size // SURVEY_TEXELS, 1)) for size in light.shape[:2])
+        surveys.append((light[few].sum(-1), np.broadcast_to(way, light.shape)[few]))
     splitter = Splitter.of(surveys)
     for number, light in enumerate(lights):
         splitter.add(number, *light)

@@ -24,17 +24,19 @@ using Texels = float __attribute__((vector_size(lanes * sizeof(float))));
     std::memcpy(texels.data(), values, sizeof(texels));
 }
 
-void add_path_products(const PlacedPaths& paths, const float* light, const float* entering, const float* albedo,
-                       float* textured, float* plain)
+void add_path_products(const PlacedPaths& paths, std::size_t count, float scale, const float* light,
+                       const float* entering, const float* albedo, float* textured, float* plain)
 {
     std::array<Texels, vectors> sum, plain_sum;
     load(textured, sum);
     load(plain, plain_sum);
-    for (std::size_t p = 0; p + 1 < paths.first.size(); ++p) {
+    for (std::size_t p = 0; p < count; ++p) {
         const std::ptrdiff_t* place = paths.places.data() + paths.first[p];
         const std::ptrdiff_t* const end = paths.places.data() + paths.first[p + 1];
         std::array<Texels, vectors> product, factor;
         load(light + *place, product);
+        for (std::size_t v = 0; v < vectors; ++v)
+            product[v] *= scale;
         load(entering + *place, factor);
         for (std::size_t v = 0; v < vectors; ++v)
             plain_sum[v] += paths.weight[p] * (product[v] * factor[v]);
@@ -59,10 +61,10 @@ namespace beamspread {
 
 HWY_EXPORT(add_path_products);
 
-void add_path_products(const PlacedPaths& paths, const float* light, const float* entering, const float* albedo,
-                       float* textured, float* plain)
+void add_path_products(const PlacedPaths& paths, std::size_t count, float scale, const float* light,
+                       const float* entering, const float* albedo, float* textured, float* plain)
 {
-    HWY_DYNAMIC_DISPATCH(add_path_products)(paths, light, entering, albedo, textured, plain);
+    HWY_DYNAMIC_DISPATCH(add_path_products)(paths, count, scale, light, entering, albedo, textured, plain);
 }
 
 }  // namespace beamspread

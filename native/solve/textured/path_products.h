@@ -18,10 +18,10 @@ struct PlacedPaths {
     std::span<const float> weight;  // [path] of the plain sum
 };
 
-// For a run of texels from `at` on, over all paths:
-//   textured[i] += light[entry + i] * product of the albedos at the scatterings
-//   plain[i] += weight * light[entry + i] * entering[entry + i]
-void add_path_products(const PlacedPaths& paths, const float* light, const float* entering, const float* albedo,
-                       float* textured, float* plain);
+// For a run of texels from `at` on, over the first `count` paths:
+//   textured[i] += scale * light[entry + i] * product of the albedos at the scatterings
+//   plain[i] += scale * weight * light[entry + i] * entering[entry + i]
+void add_path_products(const PlacedPaths& paths, std::size_t count, float scale, const float* light,
+                       const float* entering, const float* albedo, float* textured, float* plain);
 
 }  // namespace beamspread

@@ -88,6 +88,7 @@ void add_paths(SharedPaths& paths, const PathPlan& plan, std::size_t walks, Rand
             paths.places.push_back({whole((place.x - exit.x) * plan.texels_per_path[0] + within.x),
                                     whole((place.y - exit.y) * plan.texels_per_path[1] + within.y)});
         paths.first.push_back(paths.places.size());
+        paths.walk.push_back(i);
     }
 }
 

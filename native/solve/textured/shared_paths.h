@@ -22,8 +22,9 @@ struct PathPlace {
 struct SharedPaths {
     std::vector<PathPlace> places;
     std::vector<std::size_t> first{0};  // [path], and the number of all places
+    std::vector<std::size_t> walk;  // [path], ascending; other walks end inside
 
-    std::size_t size() const { return first.size() - 1; }
+    std::size_t size() const { return walk.size(); }
 };
 
 // How paths are drawn: light travels along `travel`, in the frame of the plane, z < 0. At each scattering a path goes on

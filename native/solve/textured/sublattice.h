@@ -19,7 +19,9 @@ public:
 
     std::size_t width() const { return m_width; }
     std::size_t height() const { return m_height; }
+    std::size_t side() const { return m_side; }
     std::size_t count() const { return m_side * m_side; }
+    std::size_t reach() const { return m_reach; }
     // Rows of a sublattice, and runs of `texels_per_run` texels in each.
     std::size_t rows() const { return m_rows; }
     std::size_t runs() const { return m_runs; }

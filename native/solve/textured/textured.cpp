@@ -18,6 +18,7 @@
 #include "solve/textured/shared_paths.h"
 #include "solve/textured/smooth_ratio.h"
 #include "solve/textured/sublattice.h"
+#include "solve/textured/walk_shares.h"
 
 namespace beamspread {
 
@@ -70,26 +71,12 @@ float largest(const View2D<const float>& values)
     return most;
 }
 
-double root_mean_square(const View2D<const float>& values)
+std::vector<View2D<const float>> irradiances_of(const TexturedProblem& problem)
 {
-    double sum = 0.0;
-    for (std::size_t y = 0; y < values.height; ++y)
-        for (std::size_t x = 0; x < values.width; ++x)
-            sum += static_cast<double>(values(y, x)) * values(y, x);
-    return std::sqrt(sum / static_cast<double>(values.height * values.width));
-}
-
-// Pairs of walks of each light in a unit: as the root of its power, since most lights matter where others do not.
-std::vector<std::size_t> shares_of(const std::vector<TexturedLight>& lights)
-{
-    std::vector<double> shares;
-    double sum = 0.0;
-    for (const TexturedLight& light : lights)
-        sum += shares.emplace_back(std::sqrt(root_mean_square(light.irradiance)));
-    std::vector<std::size_t> pairs;
-    for (const double share : shares)
-        pairs.push_back(static_cast<std::size_t>(std::max(std::round(unit / 2 * share / sum), 1.0)));
-    return pairs;
+    std::vector<View2D<const float>> irradiances;
+    for (const TexturedLight& light : problem.lights)
+        irradiances.push_back(light.irradiance);
+    return irradiances;
 }
 
 // Distance that all but a few paths stay within, texels.
@@ -121,18 +108,14 @@ public:
           m_survival(std::clamp(std::pow(static_cast<double>(largest(problem.albedo)), survival_power),
                                 problem.mean_albedo, max_survival)),
           m_plans(plans_of(problem, m_survival)),
-          m_pairs(shares_of(problem.lights)),
           m_sublattices(problem.albedo.width, problem.albedo.height, fineness.side,
                         reach_of(m_plans, fineness.reach_walks, problem.seed)),
           m_albedo(m_sublattices.dealt(problem.albedo, static_cast<float>(1.0 / m_survival), true)),
-          m_entering(m_sublattices.dealt(problem.factor, 1.0f, false))
+          m_entering(m_sublattices.dealt(problem.factor, 1.0f, false)),
+          m_shares(irradiances_of(problem), m_sublattices)
     {
-        for (std::size_t i = 0; i < problem.lights.size(); ++i) {
-            const TexturedLight& light = problem.lights[i];
-            // Light of fewer walks counts more.
-            const float factor = static_cast<float>(unit / 2) / static_cast<float>(m_pairs[i]);
-            m_light.push_back(m_sublattices.dealt(light.irradiance, factor, false));
-        }
+        for (const TexturedLight& light : problem.lights)
+            m_light.push_back(m_sublattices.dealt(light.irradiance, 1.0f, false));
         for (std::size_t h = 0; h < 2; ++h) {
             m_sums.textured[h].resize(texels());
             m_sums.plain[h].resize(texels());
@@ -145,18 +128,20 @@ public:
     void add(std::size_t units, const std::function<void(double)>& advance)
     {
         ++m_rounds;
+        const std::size_t walks = units * unit / 2;
         std::atomic<std::size_t> places{0};
         parallel_for(2 * m_sublattices.count(), [&](std::size_t task) {
             const std::size_t half = task / m_sublattices.count(), sublattice = task % m_sublattices.count();
             const std::size_t run_count = m_sublattices.rows() * m_sublattices.runs();
             AlignedVector<float> textured(run_count * texels_per_run), plain(run_count * texels_per_run);
+            std::size_t taken = 0;
             for (std::size_t i = 0; i < m_plans.size(); ++i) {
                 Random random(m_problem.seed + m_rounds, path_stream, task * m_plans.size() + i);
                 SharedPaths paths;
-                add_paths(paths, m_plans[i], units * m_pairs[i], random);
-                places += paths.places.size();
-                add_products(paths, sublattice, i, textured.data(), plain.data());
+                add_paths(paths, m_plans[i], m_shares.most(i, walks), random);
+                taken += add_products(paths, walks, sublattice, i, textured.data(), plain.data());
             }
+            places += taken;
             const std::size_t width = m_problem.albedo.width;
             m_sublattices.for_texels(sublattice, [&](std::size_t y, std::size_t x, std::size_t k) {
                 m_sums.textured[half][y * width + x] += textured[k] / m_problem.factor(y, x);
@@ -164,9 +149,8 @@ public:
             });
             advance(1.0 / static_cast<double>(2 * m_sublattices.count()));
         });
-        // Each sublattice has its own paths, which all of its texels take.
-        m_products +=
-            static_cast<double>(places) / static_cast<double>(m_sublattices.count()) * static_cast<double>(texels());
+        const std::size_t runs = m_sublattices.count() * m_sublattices.rows() * m_sublattices.runs();
+        m_products += static_cast<double>(places) * static_cast<double>(texels()) / static_cast<double>(runs);
     }
 
     // Scatterings of all texels in the walks so far.
@@ -248,11 +232,12 @@ private:
         return plans;
     }
 
-    void add_products(const SharedPaths& paths, std::size_t sublattice, std::size_t light, float* textured,
-                      float* plain) const
+    // Adds the paths of a light, as many of them as belong to each run of texels of all `walks`; the places that they pass.
+    std::size_t add_products(const SharedPaths& paths, std::size_t walks, std::size_t sublattice, std::size_t light,
+                             float* textured, float* plain) const
     {
         std::vector<std::ptrdiff_t> places;
-        std::vector<std::size_t> first{0};
+        std::vector<std::size_t> first{0}, walk;
         std::vector<float> weights;
         for (std::size_t p = 0; p < paths.size(); ++p) {
             const std::size_t begin = paths.first[p], end = paths.first[p + 1];
@@ -261,27 +246,37 @@ private:
             for (std::size_t k = begin; k < end; ++k)
                 places.push_back(m_sublattices.offset(sublattice, paths.places[k]));
             first.push_back(places.size());
+            walk.push_back(paths.walk[p]);
             weights.push_back(
                 static_cast<float>(std::pow(m_problem.mean_albedo / m_survival, static_cast<double>(end - begin - 1))));
         }
         const PlacedPaths placed{places, first, weights};
+        std::size_t passed = 0;
         for (std::size_t row = 0; row < m_sublattices.rows(); ++row) {
             for (std::size_t number = 0; number < m_sublattices.runs(); ++number) {
+                const std::size_t own = m_shares.walks(light, row, number, walks);
+                const auto count = static_cast<std::size_t>(std::ranges::lower_bound(walk, own) - walk.begin());
+                if (count == 0)
+                    continue;
+                // Fewer walks count more.
+                const float scale = static_cast<float>(walks) / static_cast<float>(own);
                 const std::size_t at = m_sublattices.run(row, number);
                 const std::size_t to = (row * m_sublattices.runs() + number) * texels_per_run;
-                add_path_products(placed, m_light[light].data() + at, m_entering.data() + at, m_albedo.data() + at,
-                                  textured + to, plain + to);
+                add_path_products(placed, count, scale, m_light[light].data() + at, m_entering.data() + at,
+                                  m_albedo.data() + at, textured + to, plain + to);
+                passed += first[count];
             }
         }
+        return passed;
     }
 
     const TexturedProblem& m_problem;
     double m_survival;
     std::vector<PathPlan> m_plans;
-    std::vector<std::size_t> m_pairs;  // of walks of each light in a unit
     Sublattices m_sublattices;
     AlignedVector<float> m_albedo;
     AlignedVector<float> m_entering;  // the convention's factor of light that enters
+    WalkShares m_shares;
     std::vector<AlignedVector<float>> m_light;
     PathSums m_sums;
     std::uint64_t m_rounds = 0;

@@ -1,0 +1,112 @@
+#include "solve/textured/walk_shares.h"
+
+#include <algorithm>
+#include <cmath>
+#include <numeric>
+
+#include "base/threads.h"
+
+namespace beamspread {
+
+namespace {
+
+// Weight of the light within reach of a run beside that of the run itself. Larger: light that comes from beyond has less
+// noise, all other has more.
+constexpr double part_around = 0.1;
+
+// Runs of texels that follow a walk in the time in which it is drawn. Larger: shares of small planes are more alike.
+constexpr double runs_for_drawing = 40.0;
+
+// Time that drawing walks which few runs follow may add. Larger: less noise for each walk, and longer.
+constexpr double max_added = 0.5;
+
+std::size_t walks_of(float share, std::size_t all)
+{
+    if (!(share > 0.0f))
+        return 0;
+    return static_cast<std::size_t>(std::max(std::round(static_cast<double>(share) * static_cast<double>(all)), 1.0));
+}
+
+// Irradiance of the texels in each run, summed over all sublattices: [row, run].
+std::vector<double> power_of_runs(const View2D<const float>& light, const Sublattices& sublattices)
+{
+    const std::size_t side = sublattices.side(), runs = sublattices.runs();
+    std::vector<double> powers(sublattices.rows() * runs);
+    parallel_for(sublattices.rows(), [&](std::size_t row) {
+        for (std::size_t y = row * side; y < std::min((row + 1) * side, light.height); ++y)
+            for (std::size_t x = 0; x < light.width; ++x)
+                powers[row * runs + x / (side * texels_per_run)] += light(y, x);
+    });
+    return powers;
+}
+
+// Sums of the values that are at most `away` before or after each, along an axis: values are `step` apart, `count` of them.
+std::vector<double> sums_along(const std::vector<double>& values, std::size_t step, std::size_t count, std::size_t away)
+{
+    std::vector<double> sums(values.size());
+    for (std::size_t i = 0; i < values.size(); ++i) {
+        const std::size_t at = i / step % count, first = at - std::min(at, away);
+        for (std::size_t k = first; k <= std::min(at + away, count - 1); ++k)
+            sums[i] += values[i + k * step - at * step];
+    }
+    return sums;
+}
+
+}  // namespace
+
+WalkShares::WalkShares(const std::vector<View2D<const float>>& lights, const Sublattices& sublattices)
+    : m_runs(sublattices.runs())
+{
+    const std::size_t rows = sublattices.rows(), reach = sublattices.reach(), side = sublattices.side();
+    const std::size_t away_rows = (reach + side - 1) / side;
+    const std::size_t away_runs = (reach + side * texels_per_run - 1) / (side * texels_per_run);
+    std::vector<double> sums(rows * m_runs);
+    for (const View2D<const float>& light : lights) {
+        const std::vector<double> own = power_of_runs(light, sublattices);
+        const std::vector<double> near = sums_along(sums_along(own, m_runs, rows, away_rows), 1, m_runs, away_runs);
+        std::vector<float>& shares = m_shares.emplace_back(own.size());
+        for (std::size_t i = 0; i < own.size(); ++i) {
+            const double around = near[i] / static_cast<double>((2 * away_rows + 1) * (2 * away_runs + 1));
+            shares[i] = static_cast<float>(own[i] + part_around * around);
+            sums[i] += shares[i];
+        }
+    }
+    for (std::vector<float>& shares : m_shares)
+        for (std::size_t i = 0; i < shares.size(); ++i)
+            if (shares[i] > 0.0f)
+                shares[i] /= static_cast<float>(sums[i]);
+    even_out();
+}
+
+// Each sublattice draws as many walks of a light as any of its runs follow: where there are few runs, most shares come
+// nearer to their means.
+void WalkShares::even_out()
+{
+    double drawn = 0.0;
+    std::vector<double> means;
+    for (const std::vector<float>& shares : m_shares) {
+        drawn += *std::ranges::max_element(shares);
+        means.push_back(std::accumulate(shares.begin(), shares.end(), 0.0) / static_cast<double>(shares.size()));
+    }
+    const double mean_drawn = std::accumulate(means.begin(), means.end(), 0.0);
+    const double allowed = max_added * static_cast<double>(m_shares.front().size()) / runs_for_drawing;
+    if (drawn - mean_drawn <= allowed)
+        return;
+    const double part = allowed / (drawn - mean_drawn);
+    for (std::size_t light = 0; light < m_shares.size(); ++light)
+        for (float& share : m_shares[light])
+            if (share > 0.0f)
+                share = static_cast<float>(std::lerp(means[light], static_cast<double>(share), part));
+}
+
+std::size_t WalkShares::walks(std::size_t light, std::size_t row, std::size_t run, std::size_t all) const
+{
+    return walks_of(m_shares[light][row * m_runs + run], all);
+}
+
+std::size_t WalkShares::most(std::size_t light, std::size_t all) const
+{
+    return walks_of(*std::ranges::max_element(m_shares[light]), all);
+}
+
+}  // namespace beamspread
