@@ -155,7 +155,7 @@ def test_a_closed_sheet_is_said_to_be_hollow_and_keeps_its_normals():
         mesh = flatten(polygons, PATH, "Shade", is_sheet=True)
         (message,) = mesh.messages
         assert words in message.text
-        assert "Infinite Thickness" in message.remedy
+        assert "Infinite Depth" in message.remedy
         grid = build_receiver(mesh, 32, 16).charts[0].grid
         assert np.sign(grid.height_of((0.0, 0.0, 0.0))) == (1 if polygons is inward else -1)
     solid = flatten(inward, PATH, "Ball")

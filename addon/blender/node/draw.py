@@ -99,8 +99,9 @@ def _draw_color(node, layout) -> None:
 def _draw_path(node, layout) -> None:
     """Draw the path as one length, by hand or by a slider, with a color; below it the lengths of the channels."""
     column = layout.column(align=True)
-    column.prop(node, "path_length")
-    column.prop(node, "path_slider", slider=True)
+    # Their names do not fit into a field of the default width.
+    column.prop(node, "path_length", text="Path")
+    column.prop(node, "path_slider", text="Slider", slider=True)
     layout.prop(node, "path_color")
     lengths = readable_lengths([length * meters_per_unit() for length in node.mean_free_path])
     layout.label(text=f"Mean free path: {lengths}", icon="DRIVER_DISTANCE")

@@ -111,7 +111,7 @@ class PathProperties:
         options=set(),
     )
     is_infinite: BoolProperty(
-        name="Infinite Thickness",
+        name="Infinite Depth",
         description="Let light spread into the depth without end. Off: the material is a slab of the thickness below",
         get=lambda node: node.thickness == 0,
         set=_set_infinite,

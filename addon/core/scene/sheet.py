@@ -37,4 +37,4 @@ def sheet_messages(polygons: Polygons, name: str) -> list[Message]:
         return []
     inner = "whose back is the inside" if (volumes > 0).all() else "whose front is the inside: its normals point inward"
     text = f"'{name}' is closed, so its Thickness is that of a hollow wall, {inner}."
-    return [note(name, text, "Turn Infinite Thickness on for a solid body.")]
+    return [note(name, text, "Turn Infinite Depth on for a solid body.")]
