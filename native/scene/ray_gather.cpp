@@ -46,12 +46,12 @@ public:
           m_occluders(occluders),
           m_with_travel(settings.with_travel),
           m_ray_count(static_cast<std::size_t>(settings.rays)),
-          m_even_rays(occluders ? std::min(static_cast<std::size_t>(settings.even_rays), m_ray_count) : 0),
+          m_even_rays(std::min(static_cast<std::size_t>(settings.even_rays), m_ray_count)),
           m_sobol(m_ray_count, settings.seed),
           m_even_sobol(std::max<std::size_t>(m_even_rays, 1), settings.seed),
           m_rays(grid, occluders, settings.clearance)
     {
-        if (m_even_rays > 0 && m_even_rays < m_ray_count)
+        if (occluders && m_even_rays > 0 && m_even_rays < m_ray_count)
             m_first_pass.emplace(grid.width, grid.height, m_even_rays, m_ray_count, settings.seed);
         if (settings.noise)
             m_noise.resize(grid.height);
@@ -169,13 +169,16 @@ private:
 
     RayMethod method(const Work& work, std::size_t x) const
     {
-        return has_first_pass() ? work.row.method(x) : RayMethod::even;
+        return has_first_pass() ? work.row.method(x) : is_open() ? RayMethod::open : RayMethod::even;
     }
 
     std::size_t rays_of(const Work& work, std::size_t x) const
     {
-        return has_first_pass() ? work.row.rays(x) : m_ray_count;
+        return has_first_pass() ? work.row.rays(x) : is_open() ? m_even_rays : m_ray_count;
     }
+
+    // True if nothing blocks rays of any texel.
+    bool is_open() const { return !m_occluders && m_even_rays > 0; }
 
     // Traces few rays from a row.
     void trace_first(std::size_t y)
@@ -266,9 +269,9 @@ private:
     void add_halves(std::size_t first, std::size_t count, Work& work) const
     {
         const std::size_t width = work.span.width;
-        bool is_open = has_first_pass();
+        bool is_open = true;
         for (std::size_t k = 0; k < width && is_open; ++k)
-            is_open = work.row.method(work.span.x + k) <= RayMethod::open;
+            is_open = method(work, work.span.x + k) <= RayMethod::open;
         for (std::size_t i = 0; i < count && !is_open; ++i)
             for (std::size_t k = 0; k < width; ++k) {
                 const std::size_t half = 2 * (first + i) < rays_of(work, work.span.x + k) ? 0 : 1;

@@ -54,7 +54,7 @@ struct RaySettings {
     // Lights of a size: rays from each texel.
     int rays = 16;
     // Lights of a size: rays of a first pass. They are enough in texels that, with their neighbors, see only light or only
-    // obstacles. 0: no first pass.
+    // obstacles, and in all texels without occluders. 0: no first pass.
     int even_rays = 0;
     std::uint32_t seed = 0;
     // Height above the plane where shadow rays start, metres, besides what rounding needs: the largest distance of the

@@ -51,6 +51,18 @@ def test_without_occluders_there_is_no_noise(name):
 
 
 @pytest.mark.parametrize("name", LIGHTS)
+def test_without_occluders_few_rays_are_enough(name):
+    """As many as where an occluder, here below the plane, turns out to block none: the same bits."""
+    alone, beside, all_rays = (
+        native.gather_rays(receiver(), LIGHTS[name], caster, rays=64, even_rays=even, seed=2)
+        for caster, even in ((None, 8), (card(height=-1.0), 8), (None, 0))
+    )
+    for found, expected in zip(alone, beside):
+        np.testing.assert_array_equal(found, expected)
+    assert (alone[1] != all_rays[1]).any()
+
+
+@pytest.mark.parametrize("name", LIGHTS)
 def test_a_ray_has_one_direction_toward_the_plane(name):
     irradiance, flow = native.gather_rays(receiver(), LIGHTS[name], card(), rays=1, seed=9)
     assert irradiance.dtype == flow.dtype == np.float32

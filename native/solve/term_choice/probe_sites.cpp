@@ -42,8 +42,8 @@ public:
     // The part with a texel; null in a gap.
     const PlanePart* part_of(const Texel& texel) const
     {
-        const auto part = std::ranges::find_if(m_parts, [&](const PlanePart& part) {
-            return texel.y - part.y < part.height && texel.x - part.x < part.width;  // unsigned
+        const auto part = std::ranges::find_if(m_parts, [&](const PlanePart& other) {
+            return texel.y - other.y < other.height && texel.x - other.x < other.width;  // unsigned
         });
         return part == m_parts.end() ? nullptr : &*part;
     }
