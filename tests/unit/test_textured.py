@@ -117,6 +117,20 @@ def test_beams_have_all_the_light():
         assert direction[2] < 0
 
 
+def test_last_bits_of_the_light_change_no_direction():
+    """Hosts differ in them. Light from a lamp near the middle of a plane, at whose texels directions differ by 1e-6."""
+    rows, columns = np.mgrid[:48, :40] - 20.3
+    way = np.stack([columns, rows, np.full_like(rows, -9.0)], -1)
+    noise = 1e-5 * np.random.default_rng(3).standard_normal(way.shape)
+    light = np.ones((48, 40, 3), np.float32)
+    ours, others = (
+        beams_of([(light, np.float32(values / np.linalg.norm(values, axis=-1, keepdims=True)))])
+        for values in (way, way + noise)
+    )
+    for (_, one), (_, other) in zip(ours, others, strict=True):
+        np.testing.assert_array_equal(one, other)
+
+
 def test_no_lights_are_named():
     with pytest.raises(ValueError, match="lights"):
         convolve_lights([], LDF, STRIPES, 1.0, 1.0)

@@ -33,6 +33,9 @@ SURVEY_TEXELS = 48
 DIGITS = 7
 """Digits of directions that count. More: last bits that depend on the C library of the process."""
 
+ANGLE_DIGITS = 1
+"""Digits of the angles, degrees, between which light is split. More: last bits of the light that change a few paths."""
+
 Beams = list[tuple[NDArray[np.float32], NDArray[np.float64]]]
 """Irradiance (H, W, 3), and the direction of travel of each."""
 
@@ -193,9 +196,9 @@ def _nodes(values: NDArray, weights: NDArray, most: int) -> tuple[float, ...]:
     """One value, or some from the least to the largest between which nearly all of the weight lies."""
     low, high = _quantiles(values, weights)
     if high - low < NARROW:
-        return ((low + high) / 2,)
+        return _rounded([(low + high) / 2])
     count = min(max(round((high - low) / STEP) + 1, 2), most)
-    return tuple(np.linspace(low, high, count).tolist())
+    return _rounded(np.linspace(low, high, count))
 
 
 def _quantiles(values: NDArray, weights: NDArray) -> tuple[float, float]:
@@ -211,13 +214,17 @@ def _quantiles(values: NDArray, weights: NDArray) -> tuple[float, float]:
 def _azimuth_nodes(values: NDArray, weights: NDArray, one_azimuth: float) -> tuple[tuple[float, ...], bool]:
     """Azimuths, degrees, ascending; True if they go around."""
     turns = np.exp(1j * np.radians(values))
-    middle = round(float(np.degrees(np.angle((weights * turns).sum()))), 2)  # see `DIGITS`
+    middle = float(np.degrees(np.angle((weights * turns).sum())))
     low, high = _quantiles((values - middle + 180) % 360 - 180, weights)
     if high - low < one_azimuth:
-        return (middle + (low + high) / 2,), False
+        return _rounded([middle + (low + high) / 2]), False
     if high - low <= 180:
-        return (middle + low, middle + (low + high) / 2, middle + high), False
-    return tuple(middle + turn for turn in (0.0, 90.0, 180.0, 270.0)), True
+        return _rounded([middle + low, middle + (low + high) / 2, middle + high]), False
+    return _rounded([middle + turn for turn in (0.0, 90.0, 180.0, 270.0)]), True
+
+
+def _rounded(angles: Iterable[float]) -> tuple[float, ...]:
+    return tuple(round(float(angle), ANGLE_DIGITS) for angle in angles)
 
 
 def _weight(values: NDArray, nodes: Sequence[float], number: int) -> NDArray:

@@ -17,6 +17,10 @@ constexpr double part_around = 0.1;
 // Runs of texels that follow a walk in the time in which it is drawn. Larger: shares of small planes are more alike.
 constexpr double runs_for_drawing = 40.0;
 
+// Steps of shares in each octave. More: shares are nearer to the best ones, and more of them are others where last bits of
+// the light are, as from one host to the next.
+constexpr double share_steps = 2.0;
+
 // Time that drawing walks which few runs follow may add. Larger: less noise for each walk, and longer.
 constexpr double max_added = 0.5;
 
@@ -76,6 +80,11 @@ WalkShares::WalkShares(const std::vector<View2D<const float>>& lights, const Sub
             if (shares[i] > 0.0f)
                 shares[i] /= static_cast<float>(sums[i]);
     even_out();
+    for (std::vector<float>& shares : m_shares)
+        for (float& share : shares)
+            if (share > 0.0f)
+                share = static_cast<float>(
+                    std::exp2(std::round(share_steps * std::log2(static_cast<double>(share))) / share_steps));
 }
 
 // Each sublattice draws as many walks of a light as any of its runs follow: where there are few runs, most shares come
