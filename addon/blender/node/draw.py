@@ -93,7 +93,7 @@ def _draw_color(node, layout) -> None:
     if node.color_mode == "BASE_COLOR":
         layout.prop(node, "base_color")
     else:
-        _draw_channels(layout, node, "albedo", "Scattering Albedo")
+        _draw_channels(layout, node, "albedo", "Albedo")
 
 
 def _draw_path(node, layout) -> None:
