@@ -67,7 +67,7 @@ class TimeLeft:
     def words(self) -> str:
         """The time left as a window shows it, such as "about 8 s left"; "" before the first update.
 
-        Its number never grows: if the estimate does, it stays, as what the run takes at least.
+        Its number never grows: if the estimate does, it stays, as the least time that is left.
         """
         if math.isinf(self._shown):
             return ""

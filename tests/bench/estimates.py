@@ -3,9 +3,9 @@
     PYTHONPATH=build/stage build/venv/bin/python tests/bench/estimates.py [SCENE...] [--resolution N...] [--times N]
 
 Each scene is baked in a session of its own, which has measured nothing yet; `--times` repeats it. Resolution 0 is the
-scene's own. Scenes without a
-Beamspread node get a plane of marble. *Panel* is what panels announce, *scene* the estimate once the scene was read.
-CPU seconds are those of all threads and of Cycles: on a busy machine, compare their fraction that all cores would take.
+scene's own. Scenes without a Beamspread node get a plane of marble. *Panel* is the time that panels announce, *scene*
+the estimate once the scene was read. CPU seconds are those of all threads and of Cycles: on a busy machine, compare
+their fraction that all cores would take.
 *Left* is the error of the time left while the bake ran, over all of its time: its mean, and its maximum.
 """
 

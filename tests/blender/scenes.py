@@ -128,6 +128,14 @@ def add_lamp(location=None, power=100.0, kind="POINT", name="Lamp", matrix=None,
     return obj
 
 
+def add_lamp_and_sky(side):
+    """Soft light from all around and from one side; bakes have `side` texels along a side, and no bounces."""
+    settings = bpy.context.scene.beamspread
+    settings.use_indirect, settings.resolution, settings.margin = False, side, 4
+    add_lamp((0.4, -0.6, 2.0), power=200)
+    add_world((0.3, 0.3, 0.3, 1))
+
+
 def add_instancer(collection, matrix=None, name="Holder", within=None):
     """An instance of a collection."""
     holder = bpy.data.objects.new(name, None)

@@ -7,7 +7,7 @@ import bpy
 import pytest
 from beamspread.blender.jobs.announced import line_of, simulation_line
 from beamspread.blender.jobs.out_of_date import stale
-from beamspread.blender.jobs.run.bake_plan import read_scene
+from beamspread.blender.jobs.run.bake_plan import prepare_scene, read_scene
 from beamspread.blender.jobs.state import Run, state
 from beamspread.blender.live import timer
 from beamspread.blender.node.find import find_targets
@@ -148,6 +148,34 @@ def test_rooms_take_longer_as_their_bakes_do():
         if step.kind == BouncedLight.name
     ]
     assert in_a_room == pytest.approx(read, rel=0.05)  # which reads triangles, the panel counts faces
+
+
+@pytest.mark.parametrize(("gray", "radius"), [(0.2, 0.0), (0.7, 0.0), (0.7, 0.6)])
+def test_few_rays_find_about_as_much_bounced_light_as_the_bake(gray, radius):
+    """Part of all light that is bounced, in a room whose floor is baked; a shade hides the lamp from its middle.
+
+    Bound: 1.3 times, since 128 rays have a tenth of noise or so, and later bounces are guessed.
+    """
+    scene = bpy.context.scene
+    scene.beamspread.use_indirect = True
+    floor = plane(size=(4.0, 4.0))
+    bpy.ops.mesh.primitive_cube_add(size=4, location=(0, 0, 1.99))
+    shade = add_plane("Shade", (2 * radius or 0.01,) * 2, Matrix.Translation((0, 0, 1.5)))
+    for obj in (bpy.context.object, shade):
+        obj.data.materials.append(diffuse_material((gray,) * 3))
+    add_lamp((0, 0, 2.5))
+    stale.refresh(bpy.context)
+    (name,) = find_targets([floor])
+    announced_part = state.announced[name].around.returned[0]
+    means = []
+    for indirect in (True, False):
+        settings = scene.beamspread.for_bake(output="IRRADIANCE", indirect=indirect)
+        (bake,) = prepare_scene(bpy.context, [name], settings, 32)
+        bake.run()
+        assert not bake.error
+        means.append(float(bake.texture.mean()))
+    part = 1 - means[1] / means[0]
+    assert part / 1.3 < announced_part < 1.3 * part
 
 
 def test_measured_times_correct_the_line():

@@ -22,10 +22,7 @@ MODIFIER = "Beamspread UV Map"
 
 @pytest.fixture(autouse=True)
 def light():
-    settings = bpy.context.scene.beamspread
-    settings.use_indirect, settings.resolution, settings.margin = False, SIDE, 4
-    scenes.add_lamp((0.4, -0.6, 2.0), power=200)
-    scenes.add_world((0.3, 0.3, 0.3, 1))
+    scenes.add_lamp_and_sky(SIDE)
 
 
 def add_text(body="Ab", **options):

@@ -52,7 +52,7 @@ def test_without_occluders_there_is_no_noise(name):
 
 @pytest.mark.parametrize("name", LIGHTS)
 def test_without_occluders_few_rays_are_enough(name):
-    """As many as where an occluder, here below the plane, turns out to block none: the same bits."""
+    """An occluder below the plane blocks no ray: without it, texels have as many rays, and the same bits."""
     alone, beside, all_rays = (
         native.gather_rays(receiver(), LIGHTS[name], caster, rays=64, even_rays=even, seed=2)
         for caster, even in ((None, 8), (card(height=-1.0), 8), (None, 0))

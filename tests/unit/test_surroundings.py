@@ -100,7 +100,7 @@ def test_more_triangles_take_longer_and_bodies_less():
 
 
 def test_light_that_few_directions_bring_takes_longer():
-    """What rays have found counts, not how enclosed a surface is; the filter of Cycles removes part of that noise."""
+    """The light that rays found counts, however enclosed a surface is; a filter removes part of the noise in Cycles."""
     even, spotty = (Surroundings(0.5, 1.0, returned) for returned in ((0.3, 0.3), (0.3, 0.6)))
     dark = Surroundings(1.0, 0.0, (0.0, 0.0))
     assert seconds(around=dark) < seconds(around=even) < seconds(around=spotty)

@@ -206,7 +206,7 @@ def _kinds(owner) -> NodeKinds:
 
 
 def _look_of(obj) -> Look:
-    """What rays see of an evaluated object: the means over its slots."""
+    """The look of an evaluated object to rays: the mean over its material slots."""
     materials = [slot.material.original for slot in obj.material_slots if slot.material is not None]
     looks = [
         scene_cache.get(("look", item), [item, item.node_tree], lambda item=item: _look(item)) for item in materials

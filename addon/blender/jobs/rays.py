@@ -179,7 +179,7 @@ def _from_lamp(lamp: Light, point: np.ndarray, normal: np.ndarray) -> tuple[floa
     direction = way / distance
     falloff = max(float(direction @ normal), 0.0) / distance**2
     if isinstance(lamp, AreaLight):
-        # Of the radiance strength / (4 area), as seen from afar.
+        # Seen from afar, a lamp of that strength has the radiance strength / (4 area).
         axis = np.array(lamp.frame[2])
         facing = max(float(direction @ axis) / (float(np.linalg.norm(axis)) or 1.0), 0.0)
         return 0.25 * strength * facing * falloff, direction, distance
