@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 import scenes
 from beamspread.blender.images import files, waiting
+from beamspread.blender.jobs.run.bake_run import BakeRun
 from beamspread.blender.jobs.state import state
 from beamspread.core.errors import ImageError
 from beamspread.core.native import native
@@ -266,6 +267,25 @@ def test_an_image_waits_for_its_last_object(kind, last_fails, tmp_path, monkeypa
     for number in range(count):
         middle = int((number + 0.5) / len(planes) * SIDE)
         assert results[1][SIDE // 2, middle].max() > 0.01
+
+
+def test_finished_results_of_a_cancelled_run_are_written(tmp_path, monkeypatch):
+    """The second result waits when the run is cancelled; the image has it, and nothing of the others."""
+    image = make_image("EXR file", tmp_path)
+    before, planes, end = scenes.pixels(image), many_objects(image), BakeRun.end
+
+    def end_and_cancel(self, bake):
+        end(self, bake)
+        if len(self.written) == 2:
+            self._progress.cancel()
+
+    monkeypatch.setattr(waiting, "PAUSE", 1e9)
+    monkeypatch.setattr(BakeRun, "end", end_and_cancel)
+    scenes.select(*planes)
+    bpy.ops.beamspread.bake()
+    middles = [int((number + 0.5) / len(planes) * SIDE) for number in range(len(planes))]
+    changed = [bool((scenes.pixels(image)[SIDE // 2, x] != before[SIDE // 2, x]).any()) for x in middles]
+    assert changed == [True, True, False, False]
 
 
 def test_results_that_can_no_longer_be_written_are_named(tmp_path, monkeypatch):
