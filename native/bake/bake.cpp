@@ -16,8 +16,9 @@ namespace beamspread {
 
 namespace {
 
-// Rays of a texel for each ray of its first pass (`RaySettings::even_rays`), and bounds of the latter. More rays of the
-// first pass are slower and miss fewer shadows.
+// Rays of a texel for each ray of its first pass (`RaySettings::even_rays`), and bounds of the latter; the upper one is
+// at least as large as the square of the samples that are asked for. More rays of the first pass are slower and miss fewer
+// shadows.
 constexpr int rays_per_even_ray = 8;
 constexpr int min_even_rays = 4;
 constexpr int max_even_rays = 16;
@@ -119,7 +120,8 @@ RaySettings BakeOptions::ray_settings(int ray_count) const
 {
     return {.samples = samples,
             .rays = ray_count,
-            .even_rays = std::clamp(ray_count / rays_per_even_ray, min_even_rays, max_even_rays),
+            .even_rays =
+                std::clamp(ray_count / rays_per_even_ray, min_even_rays, std::max(max_even_rays, samples * samples)),
             .seed = seed,
             .threads = threads,
             .noise = noise};

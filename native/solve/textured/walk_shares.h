@@ -22,6 +22,7 @@ public:
 
 private:
     void even_out();
+    void round();
 
     std::size_t m_runs;
     std::vector<std::vector<float>> m_shares;  // [light][row, run]
