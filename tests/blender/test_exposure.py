@@ -65,7 +65,7 @@ def test_a_file_divided_by_its_exposure_is_the_bake(tmp_path, file_format, expos
     clips = is_png and exposure is None
     assert ("clips values above 1" in record.message) == clips
     if not clips:
-        last_digit = 2 ** np.ceil(np.log2(mean.max())) / 256 if file_format == "HDR" else 0.0
+        last_digit = float(2 ** np.ceil(np.log2(mean.max())) / 256) if file_format == "HDR" else 0.0
         found = values.mean(axis=(0, 1)) / stored
         assert found == pytest.approx(mean, rel=BOUNDS[file_format], abs=last_digit)
 

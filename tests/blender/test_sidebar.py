@@ -4,6 +4,7 @@ from types import SimpleNamespace
 
 import panel_layout
 import pytest
+from beamspread.blender.jobs.state import redraw
 from beamspread.blender.ui.sidebar import BEAMSPREAD_PT_sidebar
 from scenes import add_material, add_plane, add_sun, bake, select
 
@@ -34,3 +35,19 @@ def test_it_has_live_the_state_and_the_settings_of_each_bake(use_size):
     assert "Plane: Baked" in layout.said
     assert ("resolution" in layout.properties) != use_size
     assert {"use_live", "use_indirect"} <= set(layout.properties)
+
+
+def test_a_new_state_redraws_the_side_bar_and_not_the_picture_of_the_view():
+    """Blender 5.2 draws neither again by itself, and a picture of EEVEE or Cycles would begin anew."""
+    drawn = []
+
+    def part(name, **parts):
+        return SimpleNamespace(type=name, tag_redraw=lambda: drawn.append(name), **parts)
+
+    areas = [part("VIEW_3D", regions=[part("WINDOW"), part("UI")]), part("PROPERTIES", regions=[]), part("INFO")]
+    manager = SimpleNamespace(windows=[SimpleNamespace(screen=SimpleNamespace(areas=areas))])
+    redraw(SimpleNamespace(window_manager=manager))
+    assert drawn == ["UI", "PROPERTIES"]
+    drawn.clear()
+    redraw(SimpleNamespace(window_manager=manager), "VIEW_3D")
+    assert drawn == ["VIEW_3D", "PROPERTIES"]

@@ -84,7 +84,7 @@ class Outputs:
         file_format = self._format()
         if _is_limited(file_format) and largest > 1 and self._view_of is None:
             bake.warn(name, f"'{name}' clips values above 1.", "EXR keeps them, and --exposure auto scales them.")
-        if file_format == "EXR_HALF" and largest > np.finfo(np.float16).max:
+        if file_format == "EXR_HALF" and largest > float(np.finfo(np.float16).max):
             bake.warn(name, f"'{name}' has 32 bits, because 16 bits hold no values above 65504.")
 
     def path(self, target: Target, layer: str, frame: int) -> Path:

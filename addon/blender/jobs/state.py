@@ -176,11 +176,15 @@ state = State()
 
 
 def redraw(context, *area_types: str) -> None:
-    """Redraw the areas that show the state of bakes, and areas of these types."""
+    """Redraw the areas that show the state of bakes, and areas of these types; of 3D Views the side bar alone."""
     for window in context.window_manager.windows:
         for area in window.screen.areas:
             if area.type in {"PROPERTIES", "NODE_EDITOR", *area_types}:
                 area.tag_redraw()
+            elif area.type == "VIEW_3D":
+                for region in area.regions:
+                    if region.type == "UI":
+                        region.tag_redraw()
 
 
 def restart_views(context) -> None:
