@@ -116,6 +116,15 @@ def test_a_diffuse_bake_is_named_in_panel_report_and_log(tmp_path):
     assert "light spreads over 0.778 texels" in done.stdout
 
 
+def test_both_sides_of_a_sheet_have_one_line():
+    front, back = (bpy.data.images.new(name, 16, 16, float_buffer=True, alpha=False) for name in ("Front", "Back"))
+    sheet = marble_plane(0.175, image=front)
+    node = scenes.node_of(sheet.data.materials[0])
+    node.thickness, node.side, node.image_back = 0.05, "BOTH", back
+    scenes.select(sheet)
+    assert panel().count("so this is a diffuse bake") == 1
+
+
 def test_irradiance_has_no_spread():
     bpy.context.scene.beamspread.output = "IRRADIANCE"
     scenes.select(marble_plane(9.0, image=bpy.data.images.new("Coarse", 16, 16, float_buffer=True)))

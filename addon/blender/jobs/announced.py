@@ -270,7 +270,10 @@ def simulation_line(announced: dict[Target, Announced], targets: Iterable[Target
 
 
 def spread_lines(announced: dict[Target, Announced], targets: Iterable[Target]) -> list[str]:
-    """How far light spreads in the images of targets, in texels; bakes in which it spreads less than a texel apart."""
+    """How far light spreads in the images of targets, in texels; bakes in which it spreads less than a texel apart.
+
+    Both sides of a sheet have one line.
+    """
     spreads = {target: announced[target].spread for target in targets if target in announced}
     shown = [spread.texels for spread in spreads.values() if spread is not None and not spread.is_diffuse]
     # Two digits, without exponent.
@@ -278,7 +281,7 @@ def spread_lines(announced: dict[Target, Announced], targets: Iterable[Target]) 
     lines = [f"The light spreads over {least if least == most else f'{least} to {most}'} texels"] if shown else []
     diffuse = {target: spread for target, spread in spreads.items() if spread is not None and spread.is_diffuse}
     lines += [str(message) for target, spread in diffuse.items() for message in spread.messages(target.object_name)]
-    return lines[:MAX_LINES]
+    return list(dict.fromkeys(lines))[:MAX_LINES]
 
 
 def _total(chosen: list[Announced]) -> float:
