@@ -99,10 +99,11 @@ LABELS = {
     "clorox": "Bleach",
     "gatorade": "Sports Drink",
     "head_and_shoulders_shampoo": "Shampoo, Pearly",
+    "pacific_ocean_surface_water": "Ocean Water, Pacific",
     "shampoo": "Shampoo, Clear",
     "skin1": "Skin, Darker",
     "skin2": "Skin, Lighter",
-    "spectralon": "White Reference (Spectralon)",
+    "spectralon": "White (Spectralon)",
 }
 """Labels of presets whose names are trademarks, or tell artists little."""
 

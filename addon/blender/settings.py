@@ -84,14 +84,14 @@ class BeamspreadSettings(bpy.types.PropertyGroup):
         description="Choose where light distributions (LDFs) come from. Samples are for research",
         items=[
             ("LIBRARY", "Library", "Simulated for each material, for all angles and albedos", 0),
-            ("ANGULAR", "Samples, Angular", "Your own samples, interpolated by the method of Manabe et al. 2012", 1),
+            ("ANGULAR", "Angular", "Your own samples, interpolated by the method of Manabe et al. 2012", 1),
             (
                 "ADAPTIVE",
-                "Samples, Adaptive",
+                "Adaptive",
                 "Your own samples, with interpolated logarithms: more accurate",
                 2,
             ),
-            ("PLANAR", "Samples, Planar", "Your own samples, blended linearly: for comparison", 3),
+            ("PLANAR", "Planar", "Your own samples, blended linearly: for comparison", 3),
         ],
         default="LIBRARY",
     )

@@ -3,18 +3,21 @@
 import math
 import re
 import time
+from types import SimpleNamespace
 from unittest.mock import MagicMock
 
 import bpy
 import numpy as np
+import panel_layout
 import pytest
 import scenes
 from beamspread.blender import compat
 from beamspread.blender.jobs.out_of_date import stale
 from beamspread.blender.jobs.run import active_image, engine
-from beamspread.blender.jobs.run.active_image import refusals
+from beamspread.blender.jobs.run.active_image import refusals, textures_at_risk
 from beamspread.blender.jobs.run.render_copy import render_picture
 from beamspread.blender.jobs.state import Status, state
+from beamspread.blender.ui import panels
 from beamspread.blender.ui.panels import target_of_blender
 from beamspread.core.bake.job import BakeJob
 from beamspread.core.target import Target
@@ -134,8 +137,8 @@ def test_a_texture_of_the_node_is_not_baked_to(is_active):
         material.node_tree.nodes.active = scenes.node_of(material)
     scenes.select(plane)
     scenes.messages_of(lambda: bpy.ops.object.bake(type="COMBINED"))
-    assert "reload it" in state.lines()[0]
-    texture.reload()
+    assert "is a texture of the Beamspread node" in state.lines()[0]
+    bpy.context.view_layer.update()  # as every operator does
     assert np.array_equal(scenes.pixels(texture), np.full((32, 32, 3), 0.5))
 
 
@@ -386,3 +389,33 @@ class TestBakeActiveImage:
         active_image._after_bake()
         assert np.array_equal(scenes.pixels(texture), np.full((32, 32, 3), 0.5))
         assert texture.is_dirty != is_packed
+
+    @pytest.mark.parametrize(("is_packed", "is_cleared"), [(True, True), (True, False), (False, False)])
+    def test_pixels_come_back_after_a_script(self, texture, is_packed, is_cleared):
+        """Packed pixels, as those of files, and those that Blender has not cleared first."""
+        self.link(texture, "Base Color")
+        if is_packed:
+            texture.pack()
+        bpy.context.scene.render.bake.use_clear = is_cleared
+        said = scenes.messages_of(lambda: bpy.ops.object.bake(type="COMBINED"))
+        assert "no file has its pixels" not in said
+        bpy.context.view_layer.update()
+        assert np.array_equal(scenes.pixels(texture), np.full((32, 32, 3), 0.5))
+        assert active_image._after_script not in bpy.app.handlers.depsgraph_update_post
+
+    def test_a_script_hears_that_pixels_are_lost(self, texture):
+        self.link(texture, "Base Color")
+        bpy.context.scene.render.bake.use_clear = True
+        said = scenes.messages_of(lambda: bpy.ops.object.bake(type="COMBINED"))
+        assert "Blender has cleared it, and no file has its pixels" in said
+
+    def test_textures_that_another_engine_would_replace_are_named(self, texture):
+        assert textures_at_risk(bpy.context) == []
+        self.link(texture, "Base Color")
+        (sentence,) = textures_at_risk(bpy.context)
+        assert sentence == f"Bake replaces '{texture.name}', a texture of the Beamspread node in 'Medium'."
+        bpy.context.scene.render.engine = "CYCLES"
+        layout = panel_layout.Layout()
+        drawn = SimpleNamespace(layout=layout)
+        panels._warn_of_cycles(drawn, panel_layout.context())
+        assert "'Medium'" in layout.said

@@ -26,9 +26,10 @@ def test_f12_that_fails_says_why(seen):
     assert seen["popups of a failure"] == [["Beamspread: there is no picture", ["No space left on device"]]]
 
 
-def test_blender_s_own_bake_leaves_a_texture_of_the_node_as_it_was(seen):
-    assert seen["texture"] == [0.5]
-    ((title, (why, kept)),) = seen["popups of the texture"]
+@pytest.mark.parametrize("clear", [True, False])
+def test_blender_s_own_bake_leaves_a_texture_of_the_node_as_it_was(seen, clear):
+    assert seen[f"texture, {clear}"] == [0.5]
+    ((title, (why, kept)),) = seen[f"popups of the texture, {clear}"]
     assert title == "Beamspread: nothing was baked"
     assert "'Texture' is a texture of the Beamspread node" in why
     assert kept == "The image has its pixels again."

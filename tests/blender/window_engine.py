@@ -84,8 +84,9 @@ def blender_s_own_bake(plane):
     scenes.select(plane)
 
 
-def bake_into_texture(plane):
-    """Blender's own operator on a gray texture of the node, which it clears: the pixels and the popups afterwards."""
+def bake_into_texture(plane, clear: bool):
+    """Blender's own operator on a gray texture of the node, also one that it clears: pixels and popups afterwards."""
+    bpy.context.scene.render.bake.use_clear = clear
     material = plane.data.materials[0]
     texture = bpy.data.images.new("Texture", 16, 16, float_buffer=True)
     texture.pixels.foreach_set([0.5] * len(texture.pixels))
@@ -101,10 +102,11 @@ def bake_into_texture(plane):
     scenes.messages_of(lambda: in_window(bpy.ops.object.bake, "INVOKE_DEFAULT", type="COMBINED", margin=0))
     yield lambda: over
     yield lambda: not bpy.app.is_job_running("OBJECT_BAKE")
-    results["texture"] = sorted({*scenes.pixels(texture).ravel().tolist()})
-    results["popups of the texture"] = list(results["popups"])
+    results[f"texture, {clear}"] = sorted({*scenes.pixels(texture).ravel().tolist()})
+    results[f"popups of the texture, {clear}"] = list(results["popups"])
     material.node_tree.links.remove(link)
     material.node_tree.nodes.remove(source)
+    bpy.data.images.remove(texture)
 
 
 class Broken:
@@ -160,7 +162,8 @@ def scenario():
 
     yield from fail_to_render()
     yield from blender_s_own_bake(plane)
-    yield from bake_into_texture(plane)
+    for clear in (False, True):
+        yield from bake_into_texture(plane, clear)
 
     tree = plane.data.materials[0].node_tree
     for node in tree.nodes:

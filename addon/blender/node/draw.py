@@ -58,7 +58,7 @@ def _is_selected(node) -> bool:
 
 def draw_properties(node, layout) -> None:
     """Draw the node's properties and buttons."""
-    layout.prop(node, "preset")
+    _draw_preset(node, layout)
     _draw_color(node, layout)
     _draw_path(node, layout)
     layout.prop(node, "anisotropy")
@@ -78,6 +78,16 @@ def draw_properties(node, layout) -> None:
             layout.template_ID(node, name, new="image.new", open="image.open", **label)
     _draw_map(node, layout)
     _draw_actions(node, layout)
+
+
+def _draw_preset(node, layout) -> None:
+    """Draw the preset: in panels over the whole width, since half of it would cut long names."""
+    if not layout.use_property_split:
+        layout.prop(node, "preset")
+        return
+    row = layout.row()
+    row.use_property_split = False
+    row.prop(node, "preset", text="", icon="PRESET")
 
 
 def _draw_color(node, layout) -> None:
@@ -104,7 +114,11 @@ def _draw_path(node, layout) -> None:
     column.prop(node, "path_slider", text="Slider", slider=True)
     layout.prop(node, "path_color")
     lengths = readable_lengths([length * meters_per_unit() for length in node.mean_free_path])
-    layout.label(text=f"Mean free path: {lengths}", icon="DRIVER_DISTANCE")
+    # Three lengths beside their name would not fit into a side bar of the default width.
+    lines = ["Mean free path:", lengths] if "," in lengths else [f"Mean free path: {lengths}"]
+    column = layout.column(align=True)
+    for number, line in enumerate(lines):
+        column.label(text=line, icon="BLANK1" if number else "DRIVER_DISTANCE")
 
 
 def new_medium_line(node) -> str:

@@ -177,7 +177,7 @@ class BeamspreadNode(ColorProperties, PathProperties, bpy.types.ShaderNodeCustom
             ("BASE_COLOR", "Base Color", "Set the visible color; the albedo is computed", 0),
             (
                 "ALBEDO",
-                "Scattering Albedo",
+                "Albedo",
                 "Set the share of light that survives each scattering event. For a bright material it is above 0.99",
                 1,
             ),

@@ -8,7 +8,7 @@ from .. import compat
 from ..images.files import clips
 from ..images.image_operators import images_in, wanted_size
 from ..images.udim import is_tiled
-from ..jobs.run.active_image import active_image, refusals
+from ..jobs.run.active_image import active_image, refusals, textures_at_risk
 from ..jobs.run.engine import BeamspreadEngine
 from ..jobs.state import state
 from ..node.draw import draw_properties
@@ -258,6 +258,21 @@ class MaterialPanel:
         draw_image_buttons(layout, context)
 
 
+def _warn_of_cycles(panel, context) -> None:
+    """Name textures that the Bake of Cycles would replace, which this add-on can't stop."""
+    draw_lines(panel.layout, context, textures_at_risk(context), "ERROR")
+
+
+def _warn_in_cycles() -> None:
+    if panel := getattr(bpy.types, "CYCLES_RENDER_PT_bake", None):  # none without the add-on Cycles
+        panel.prepend(_warn_of_cycles)
+
+
+def _end_warnings() -> None:
+    if panel := getattr(bpy.types, "CYCLES_RENDER_PT_bake", None):
+        panel.remove(_warn_of_cycles)
+
+
 def _active_material(context):
     return getattr(context, "material", None) or getattr(context.object, "active_material", None)
 
@@ -289,4 +304,4 @@ _classes = (
     BEAMSPREAD_PT_material,
     BEAMSPREAD_PT_node_editor,
 )
-register, unregister = all_or_nothing(*classes(*_classes))
+register, unregister = all_or_nothing(*classes(*_classes), (_warn_in_cycles, _end_warnings))

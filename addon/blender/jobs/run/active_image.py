@@ -1,10 +1,14 @@
 """The image that Blender's own Bake fills: the one of the active texture node. Textures of the artist are refused.
 
-Blender clears the image before it asks the engine for anything. *Bake Active Image* therefore refuses beforehand;
-where Blender's operator was started by itself, refused images get their pixels back afterwards.
+Blender clears the image before it asks the engine for anything, and writes black to it if the engine refuses. *Bake
+Active Image* therefore refuses beforehand; where Blender's operator was started by itself, refused images get their
+pixels back afterwards. Only in scripts, which tell nobody that they begin, are pixels lost that were never saved.
 """
 
 from __future__ import annotations
+
+import threading
+from pathlib import Path
 
 import bpy
 import numpy as np
@@ -50,8 +54,8 @@ def check_active_image(target: BakeTarget, settings: BakeSettings, is_running: b
     reader = _reader(active, target)
     if reader:
         remedy = "Add an Image Texture node with another image, and select that."
-        if is_running and not _saved.has(active):
-            remedy = f"If Blender has cleared it, reload it (Image > Reload). {remedy}"
+        if is_running and not (_saved.has(active) or _saved.take_in_script(active)):
+            remedy = f"Blender has cleared it, and no file has its pixels. {remedy}"
         raise ImageError(f"The active image '{active.name}' is a texture of {reader} and no target.", remedy)
     if settings.layer != COMBINED and active in (target.node.image, target.node.image_back):
         raise ImageError(
@@ -85,6 +89,17 @@ def _images_read(node) -> set:
                     waiting.append(source)
                     images.add(getattr(source, "image", None))
     return images - {None}
+
+
+def textures_at_risk(context) -> list[str]:
+    """Sentences on textures that Blender's Bake of another engine would replace, by the selected objects."""
+    found = {}
+    for obj in list(context.view_layer.objects.selected)[:MAX_OBJECTS]:
+        for target in targets_of(obj) if obj.type == "MESH" else ():
+            image = active_image(target.material)
+            if image is not None and (reader := _reader(image, target)):
+                found[image] = f"Bake replaces '{image.name}', a texture of {reader} in '{target.material.name}'."
+    return list(found.values())
 
 
 def refusals(context) -> dict:
@@ -144,15 +159,37 @@ class _Saved:
         self._reasons: list[str] = []
 
     def take(self, images: dict) -> None:
+        """Note images before Blender touches them, each with the reason why it is refused."""
         self._reasons = list(dict.fromkeys(images.values()))
         self._pixels, self._packed = {}, set()
         for image in images:
-            if 0 in image.size or is_tiled(image):
-                continue
+            if not (0 in image.size or is_tiled(image)):
+                self._take_pixels(image)
+                if not image.is_dirty and image.source != "GENERATED":
+                    self._packed.add(image.name)
+
+    def _take_pixels(self, image) -> None:
+        self._pixels[image.name] = np.empty(len(image.pixels), np.float32)
+        image.pixels.foreach_get(self._pixels[image.name])
+
+    def take_in_script(self, image) -> bool:
+        """Note an image while a script's bake runs; False if it can't get its pixels back.
+
+        Blender may have cleared it: then those of its file come back. The handler that ends the bake is called for
+        windows alone, but each operator ends with an update of the scene.
+        """
+        if threading.current_thread() is not threading.main_thread() or 0 in image.size:
+            return False
+        if not bpy.context.scene.render.bake.use_clear:
+            self._take_pixels(image)
+        elif image.packed_files or Path(bpy.path.abspath(image.filepath, library=image.library)).is_file():
             self._pixels[image.name] = np.empty(len(image.pixels), np.float32)
-            image.pixels.foreach_get(self._pixels[image.name])
-            if not image.is_dirty and image.source != "GENERATED":
-                self._packed.add(image.name)
+            self._packed.add(image.name)
+        else:
+            return False
+        if _after_script not in bpy.app.handlers.depsgraph_update_post:
+            bpy.app.handlers.depsgraph_update_post.append(_after_script)
+        return True
 
     def has(self, image) -> bool:
         """True if the image gets its pixels back."""
@@ -172,7 +209,7 @@ class _Saved:
         if self._pixels:
             kept = "The images have their pixels again." if len(self._pixels) > 1 else "The image has its pixels again."
             popup.show_soon("Beamspread: nothing was baked", [*self._reasons, kept])
-        self._pixels.clear()
+        self._pixels, self._packed, self._reasons = {}, set(), []
 
 
 _saved = _Saved()
@@ -180,8 +217,14 @@ _saved = _Saved()
 
 @persistent
 def _before_bake(*_arguments) -> None:
-    if bpy.context.scene.render.engine == ENGINE and bpy.context.scene.render.bake.use_clear:
+    if bpy.context.scene.render.engine == ENGINE:
         _saved.take(refusals(bpy.context))
+
+
+def _after_script(*_arguments) -> None:
+    """Give images back at the first update after a script's bake."""
+    bpy.app.handlers.depsgraph_update_post.remove(_after_script)
+    _saved.give_back()
 
 
 @persistent
@@ -189,7 +232,13 @@ def _after_bake(*_arguments) -> None:
     _saved.give_back()
 
 
+def _forget_scripts() -> None:
+    if _after_script in bpy.app.handlers.depsgraph_update_post:
+        bpy.app.handlers.depsgraph_update_post.remove(_after_script)
+
+
 register, unregister = all_or_nothing(
     *classes(BEAMSPREAD_OT_bake_active),
+    (lambda: None, _forget_scripts),
     *handlers(object_bake_pre=_before_bake, object_bake_complete=_after_bake, object_bake_cancel=_after_bake),
 )
