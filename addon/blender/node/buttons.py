@@ -72,7 +72,7 @@ class BEAMSPREAD_OT_make_plain(NodeOperator, bpy.types.Operator):
     def change(self, node):
         if output.has_plain(node):
             output.remove_plain(node)
-            self.report({"INFO"}, "The Beamspread node shows the bake again. glTF files don't show it")
+            self.report({"INFO"}, "The Beamspread node shows the bake again")
             return {"FINISHED"}
         if self.kind == plain.GROUP:
             output.make_plain(node)
