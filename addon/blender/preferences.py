@@ -189,7 +189,8 @@ class BeamspreadPreferences(bpy.types.AddonPreferences):
                 column.label(text=line, icon="BLANK1" if number else "ERROR")
         layout.use_property_split = True
         layout.use_property_decorate = False
-        column = layout.column(heading="New Nodes")
+        layout.label(text="Values of new nodes:", icon="NODE_MATERIAL")  # Blender shows no heading above a menu
+        column = layout.column()
         column.prop(self, "new_preset")
         if self.new_preset == CUSTOM_PRESET:
             column.prop(self, "new_base_color")

@@ -72,7 +72,7 @@ def png(texture: np.ndarray, bits: int = 8, exposure: float = 1.0) -> bytes:
 def _spread_thresholds(width: int, height: int) -> np.ndarray:
     """Numbers from 0 to 1 that fill each part of an image evenly, (height, width, 3).
 
-    The sequence R2 along columns and rows (M. Roberts, "The Unreasonable Effectiveness of Quasirandom Sequences", 2018):
+    Sequence R2 along columns and rows (M. Roberts, "The Unreasonable Effectiveness of Quasirandom Sequences", 2018):
     means of areas have a tenth of the error that random numbers leave.
     """
     across, up = (np.arange(count) * step % 1 for count, step in zip((width, height), R2_STEPS))

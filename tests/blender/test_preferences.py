@@ -5,10 +5,13 @@ import os
 import shutil
 import subprocess
 from pathlib import Path
+from types import SimpleNamespace
 
 import beamspread
 import bpy
+import panel_layout
 import pytest
+from beamspread.blender.preferences import CUSTOM_PRESET, BeamspreadPreferences
 from scenes import blender_command
 
 SCRIPT = """
@@ -69,3 +72,19 @@ def test_preferences_reach_bakes_and_the_cache(name, tmp_path):
     assert len(pages) > 10
     assert all(Path(file.removeprefix("file://")).is_file() for file in files), files
     assert after != during
+
+
+class Layout(panel_layout.Layout):
+    """Takes properties as well, among the lines."""
+
+    def prop(self, _owner, name, **_options):
+        self.said += f"<{name}> "
+
+    def label(self, text, icon="NONE"):
+        super().label(text, icon)
+
+
+def test_the_values_of_new_nodes_are_named_so():
+    layout = Layout()
+    BeamspreadPreferences.draw(SimpleNamespace(layout=layout, new_preset=CUSTOM_PRESET), panel_layout.context())
+    assert "Values of new nodes: <new_preset> <new_base_color> <new_path> <new_ior> <threads>" in layout.said
