@@ -363,3 +363,16 @@ def test_messages_name_textures_that_live_cannot_evaluate():
     material.node_tree.links.new(scenes.node_of(material).inputs["Base Color"], noise.outputs["Color"])
     assert live_pixels(material).max() > 0
     assert "Live can't evaluate the Base Color of 'Plane'" in live_lines()[0]
+
+
+def test_a_node_that_its_material_does_not_show_is_named():
+    """As a new node beside the former shader: the view would show nothing of Live, without a word."""
+    _plane, _lamp, material = make_scene()
+    settle()
+    assert not any("not shown" in message.line() for message in timer.messages())
+    links = material.node_tree.links
+    for link in list(links):
+        links.remove(link)
+    settle()
+    (said,) = [message.line() for message in timer.messages() if "not shown" in message.line()]
+    assert f"'{material.name}'" in said

@@ -16,6 +16,7 @@ from ..images.facts import ImageFacts, facts_of, owners_of
 from ..jobs.state import redraw, restart_views, state
 from ..node.find import find_node
 from ..node.node import image_of_side
+from ..node.output import is_linked
 from ..read.scene_cache import scene_cache
 from ..read.scene_changes import SceneChanges
 from .preview import Preview
@@ -133,6 +134,11 @@ class Session:
         messages.add(*self._reader.messages())
         shown = {target.target for target in self._targets}
         messages.add(*(message for target, notes in self._notes.items() if target in shown for message in notes))
+        nodes = {name: find_node(bpy.data.materials.get(name)) for name, _side in self._previews}
+        unseen = [name for name, node in nodes.items() if node is not None and not is_linked(node)]
+        if unseen:
+            names = ", ".join(f"'{name}'" for name in unseen)
+            messages.add(note("", f"Live's pictures of {names} are not shown: bake, or link the node to the output."))
         if self._sky.problem:
             messages.add(note("", f"Live has no light of the sky. {self._sky.problem}"))
         medium = self._thread.libraries.simulating
