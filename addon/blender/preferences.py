@@ -202,7 +202,7 @@ class BeamspreadPreferences(bpy.types.AddonPreferences):
         files = library.cached_files()
         megabytes = sum(file.stat().st_size for file in files if file.is_file()) / 2**20
         row = layout.row()
-        row.label(text=f"{len(files)} simulated materials, {megabytes:.1f} MB, in")
+        row.label(text=f"Cache: {len(files)} simulated materials, {megabytes:.1f} MB")
         row.operator("beamspread.clear_cache", icon="TRASH")
         layout.label(text=str(library.cache_folder()))  # a row of its own: a button would cut it off
         if url := documentation("guide"):

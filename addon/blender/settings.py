@@ -158,7 +158,7 @@ class BeamspreadSettings(bpy.types.PropertyGroup):
     )
     output_dir: StringProperty(
         name="Folder",
-        description="Choose the folder that a batch writes to",
+        description="Choose the folder that Bake Animation, Bake to Files and batches write to",
         default="//beamspread/",
         subtype="DIR_PATH",
         options=compat.PATH_OPTIONS,
@@ -212,7 +212,7 @@ class BeamspreadSettings(bpy.types.PropertyGroup):
     )
     format: EnumProperty(
         name="Format",
-        description="Choose the file format that a batch writes",
+        description="Choose the file format of Bake Animation, Bake to Files and batches",
         items=[
             ("EXR", "OpenEXR", "Linear, 32-bit float, W/(m^2 sr)", 0),
             ("PNG", "PNG", "sRGB, 8 bits; values above 1 are clipped unless Fit Exposure scales them", 1),

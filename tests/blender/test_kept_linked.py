@@ -99,6 +99,4 @@ def test_an_appended_image_is_no_ones(tmp_path):
 
 def test_frames_are_not_shown_in_linked_materials_and_the_operator_says_so(tmp_path):
     link_from_library(tmp_path)
-    assert "There are no frames of a batch: bake them with --frames A-B" in scenes.messages_of(
-        bpy.ops.beamspread.show_frames
-    )
+    assert "There are no frames: Bake Animation makes them" in scenes.messages_of(bpy.ops.beamspread.show_frames)

@@ -113,4 +113,6 @@ def test_gaps_and_missing_frames_are_reported(plane, tmp_path, capfd):
     for path in (tmp_path / "beamspread").iterdir():
         path.unlink()
     bpy.ops.beamspread.show_single()
-    assert f"no frames of a batch in {tmp_path / 'beamspread'}" in scenes.messages_of(bpy.ops.beamspread.show_frames)
+    assert f"no frames in {tmp_path / 'beamspread'}: Bake Animation makes them" in scenes.messages_of(
+        bpy.ops.beamspread.show_frames
+    )

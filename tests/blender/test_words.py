@@ -181,3 +181,9 @@ def test_presets_have_plain_names_and_say_who_measured_them():
         "Measured by Jensen et al. 2001",
         "Measured by Narasimhan et al. 2006",
     }
+
+
+def test_no_tooltip_asks_artists_for_options_of_a_command_line():
+    texts = {name: prop.description for name, prop in properties().items()}
+    texts |= {name: rna.description for name, rna in operators().items()}
+    assert not [name for name, text in texts.items() if "--" in text]

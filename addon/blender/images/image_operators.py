@@ -158,7 +158,7 @@ def _is_sequence_of(image, path: Path) -> bool:
 
 
 class BEAMSPREAD_OT_show_frames(bpy.types.Operator):
-    """Show the frames that a batch (--frames) has written to its folder. They follow the scene's frame. \
+    """Show the frames that Bake Animation or a batch has written. They follow the scene's frame. \
 Each node keeps its own image for Show Single Images"""
 
     bl_idname = "beamspread.show_frames"
@@ -179,7 +179,7 @@ Each node keeps its own image for Show Single Images"""
                 shown.append(f"'{target.name}' shows the frames {numbers[0]} to {numbers[-1]}")
         if not shown:
             where = f" in {folders[0]}" if folders else ""
-            self.report({"ERROR"}, f"There are no frames of a batch{where}: bake them with --frames A-B")
+            self.report({"ERROR"}, f"There are no frames{where}: Bake Animation makes them")
             return {"CANCELLED"}
         self.report({"INFO"}, ". ".join(shown))
         return {"FINISHED"}
@@ -195,7 +195,7 @@ Each node keeps its own image for Show Single Images"""
 
 
 class BEAMSPREAD_OT_show_single(bpy.types.Operator):
-    """Have Beamspread nodes show their own images in place of the frames of a batch"""
+    """Have Beamspread nodes show their own images again, in place of frames"""
 
     bl_idname = "beamspread.show_single"
     bl_label = "Show Single Images"

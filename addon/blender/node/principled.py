@@ -88,7 +88,8 @@ def take_over(node, shader) -> list[str]:
         notes.append(f"The node can't have textures for {', '.join(linked)}: the links in '{shader.name}' are ignored.")
     lost = lost_inputs(shader) if shader.bl_idname == PRINCIPLED else []
     if lost:
-        notes.append(f"The node has no {', '.join(lost)}: these values of '{shader.name}' are ignored.")
+        ignored = "this value of '{}' is ignored" if len(lost) == 1 else "these values of '{}' are ignored"
+        notes.append(f"The node has no {', '.join(lost)}: {ignored.format(shader.name)}.")
     return notes
 
 

@@ -84,7 +84,9 @@ def draw_problems(layout, context) -> Messages:
     shown, left = Messages(), MAX_OBJECTS
     for obj in [*chosen, *(obj for obj in inner if obj.name not in known)]:
         problems = problems_of(obj, counts) if left else Messages()
-        draw_lines(layout, context, dict.fromkeys(f"{obj.name}: {message}" for message in problems), "ERROR")
+        texts = map(str, problems)
+        lines = [text if f"'{obj.name}'" in text else f"{obj.name}: {text}" for text in texts]
+        draw_lines(layout, context, dict.fromkeys(lines), "ERROR")
         shown.add(*problems)
         left -= bool(problems)
     return shown
