@@ -74,7 +74,7 @@ class TestBakeAnimation:
             bpy.context.scene.frame_set(frame)
             stale.refresh(bpy.context)
             (row,) = state.rows.values()
-            assert (row.status, str(row.messages[0])) == (Status.BAKED, "Shows the frames 3 to 5 of a batch.")
+            assert (row.status, str(row.messages[0])) == (Status.BAKED, "Shows the frames 3 to 5.")
 
     def test_is_what_a_batch_writes(self, plane, tmp_path):
         bpy.ops.beamspread.bake_animation()

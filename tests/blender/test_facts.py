@@ -99,7 +99,7 @@ def test_frames_of_an_earlier_version_are_shown(tmp_path):
     use_keys_of_earlier_versions(image_of(plane))
     assert is_sequence(image_of(plane))
     stale.refresh(bpy.context)
-    assert state.rows[PLANE].messages[0].text.startswith("Shows the frames 3 to 4 of a batch")
+    assert state.rows[PLANE].messages[0].text.startswith("Shows the frames 3 to 4")
     assert bpy.ops.beamspread.show_single() == {"FINISHED"}
     assert image_of(plane).name == own
 

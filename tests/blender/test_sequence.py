@@ -41,7 +41,7 @@ def row_at(frame):
 
 def test_the_row_names_changes_since_the_frame_that_is_shown(plane, tmp_path):
     bpy.ops.beamspread.show_frames()
-    shown = "Shows the frames 3 to 5 of a batch"
+    shown = "Shows the frames 3 to 5"
     for frame in (3, 4, 5):
         row = row_at(frame)
         assert (row.status, *map(str, row.messages)) == (Status.BAKED, f"{shown}.")
@@ -67,7 +67,7 @@ def test_the_node_follows_the_frame(plane, tmp_path):
     own = node.image
     assert bpy.ops.beamspread.show_frames() == {"FINISHED"}
     assert is_sequence(node.image)
-    assert [*map(str, row_at(5).messages)] == ["Shows the frames 3 to 5 of a batch."]
+    assert [*map(str, row_at(5).messages)] == ["Shows the frames 3 to 5."]
     assert [file_shown(node.node_tree, frame) for frame in (1, 3, 4, 5, 9)] == [3, 3, 4, 5, 5]
     rendered = [render_brightness(plane, frame, tmp_path) for frame in (3, 4, 5)]
     written = [native.read_exr(str(path))[0].mean() for path in sorted((tmp_path / "beamspread").iterdir())]

@@ -76,14 +76,15 @@ class Outputs:
         self._exposures[key] = min(fits, former)
         if fits < former:
             text = f"From frame {frame} on, files of '{bake.target}' have the exposure {fits:g} instead of {former:g}."
-            bake.warn(str(bake.target), text, f"--exposure {fits:g} gives one to all frames.")
+            bake.warn(str(bake.target), text, f"In batches, --exposure {fits:g} gives one to all frames.")
         return self._exposures[key]
 
     def _warn_of_range(self, bake: Bake, name: str, largest: float) -> None:
         """Warn if the format does not hold the largest value of a file."""
         file_format = self._format()
         if _is_limited(file_format) and largest > 1 and self._view_of is None:
-            bake.warn(name, f"'{name}' clips values above 1.", "EXR keeps them, and --exposure auto scales them.")
+            remedy = "EXR keeps them, and Fit Exposure scales them (in batches --exposure auto)."
+            bake.warn(name, f"'{name}' clips values above 1.", remedy)
         if file_format == "EXR_HALF" and largest > float(np.finfo(np.float16).max):
             bake.warn(name, f"'{name}' has 32 bits, because 16 bits hold no values above 65504.")
 
@@ -94,7 +95,7 @@ class Outputs:
         if folder.startswith("//") and not bpy.data.filepath:
             raise ImageError(
                 "The scene was never saved, so there is no folder to write to.",
-                "Save it, or choose another folder (--output).",
+                "Save it, or choose another folder (in batches --output).",
             )
         if layer == DIRECTION and not file_format.startswith("EXR"):
             name = "An HDR file" if file_format == "HDR" else "A PNG"

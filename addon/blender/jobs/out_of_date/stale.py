@@ -194,7 +194,7 @@ def _named(changed: list[str], record: Record, now: Parts) -> str:
 
 def _row_of_frames(target: Target, frames: Frames, record: Record | None, now: Parts | None) -> Row:
     """The row of an image sequence, by the frame that is shown. A bake does not renew it, so it is not up for one."""
-    subject, shown = str(target), f"Shows the frames {frames.first} to {frames.last} of a batch."
+    subject, shown = str(target), f"Shows the frames {frames.first} to {frames.last}."
     if record is None or now is None or not record.is_comparable():
         return Row(target, Status.BAKED, (note(subject, f"{shown} Changes since then are not known."),))
     warnings, changed = record.messages(), record.changed(now)
