@@ -376,3 +376,13 @@ def test_a_node_that_its_material_does_not_show_is_named():
     settle()
     (said,) = [message.line() for message in timer.messages() if "not shown" in message.line()]
     assert f"'{material.name}'" in said
+
+
+def test_a_text_is_sent_to_a_bake_which_makes_its_map():
+    make_scene()
+    bpy.ops.object.text_add(location=(0, 2, 0))
+    bpy.context.object.data.materials.append(scenes.add_material("Letters", linked=True))
+    settle()
+    (said,) = [message.line() for message in timer.messages() if "no area" in message.line()]
+    assert said.startswith("Text / Letters: ")
+    assert said.endswith("Beamspread's own Bake makes one.")

@@ -11,7 +11,7 @@ import numpy as np
 from ..errors import ReceiverError
 from ..messages import Message, note, warning
 from .ears import triangle_corners
-from .islands import NO_UV_AREA, connected_in_map
+from .islands import NO_AREA_REMEDY, NO_UV_AREA, connected_in_map
 from .planes import FLATNESS_TOLERANCE, NO_AREA_BESIDE
 from .polygons import Polygons, same_faces
 from .sheet import bodies_of, closed_bodies
@@ -70,7 +70,7 @@ def bent_part(polygons: Polygons) -> BentPart:
     """
     is_shown = (polygons.uv_areas > NO_UV_AREA) & (polygons.areas > NO_AREA_BESIDE * polygons.areas.max())
     if not is_shown.any():
-        raise ReceiverError("The UV map has no area, in all or some of the faces.", "Unwrap the mesh again.")
+        raise ReceiverError("The UV map has no area, in all or some of the faces.", NO_AREA_REMEDY)
     islands = []
     for tile, part in polygons.of_faces(np.flatnonzero(is_shown)).by_tile().items():
         pieces, (corners, owners) = connected_in_map(part), triangle_corners(part, np.arange(part.count))

@@ -57,6 +57,10 @@ class Island:
         return abs(cosine) < FLATNESS_TOLERANCE
 
 
+NO_AREA_REMEDY = "Unwrap the mesh again. If the node's UV Map is empty, Beamspread's own Bake makes one."
+"""For a map without an area, as a text's; other uses than a bake, such as Live, make no map."""
+
+
 def check_uvs(uvs: np.ndarray | None) -> None:
     """Raise ReceiverError for UVs that are missing, no numbers, or outside of the image."""
     if uvs is None or len(uvs) == 0:
