@@ -110,7 +110,7 @@ def test_blackbody(world, temperature):
     node.inputs[0].default_value = temperature
     world.show(node.outputs[0])
     cycles = world.cycles(1)
-    assert world.ours() == pytest.approx(cycles, abs=0.004 * cycles.max())
+    assert world.ours() == pytest.approx(cycles, abs=0.004 * float(cycles.max()))
 
 
 # Inputs of a Mapping node: vector, location, rotation and scale.
