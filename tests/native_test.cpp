@@ -6,6 +6,7 @@
 #include <utility>
 #include <vector>
 
+#include "base/sobol.h"
 #include "fft/fft.h"
 #include "medium/medium.h"
 #include "python/media.h"
@@ -40,6 +41,22 @@ Array<Complex> real_transform(const Array<float>& values, int threads, const std
     const py::gil_scoped_release release;
     real_to_half_2d(instructions, in, out, height, width, threads);
     return spectrum;
+}
+
+Array<double> sobol_points(std::size_t side, std::size_t points_per_cell, std::size_t count)
+{
+    const GridSobol sobol(points_per_cell, 0);
+    Array<double> points({side * side, count, GridSobol::dimensions});
+    std::vector<Vec2> front(count), back(count);
+    double* out = points.mutable_data();
+    for (std::size_t y = 0; y < side; ++y)
+        for (std::size_t x = 0; x < side; ++x) {
+            sobol.points(x, y, 0, count, front.data(), back.data());
+            for (std::size_t i = 0; i < count; ++i)
+                for (const double value : {front[i].x, front[i].y, back[i].x, back[i].y})
+                    *out++ = value;
+        }
+    return points;
 }
 
 Array<Complex> real_lines(const Array<float>& values, const std::string& instruction_set)
@@ -146,6 +163,9 @@ A subset of "avx512", "avx2" and "baseline". An empty `instruction_set` of the f
     m.def("complex_lines", &complex_lines, py::arg("values"), py::arg("forward"), py::arg("instruction_set") = "",
           "Transforms of lines of complex values, complex64 (N, size), by e^-i, or backward by e^i; both are plain "
           "sums.");
+
+    m.def("sobol_points", &sobol_points, py::arg("side"), py::arg("points_per_cell"), py::arg("count"),
+          "The first points of each cell of a square grid: float64 (side * side, count, 4).");
 
     m.def("henyey_greenstein_pdf", py::vectorize(&henyey_greenstein_pdf), py::arg("cos_theta"), py::arg("g"),
           "Density per steradian of a deflection.");

@@ -84,13 +84,21 @@ void GridSobol::points(std::size_t x, std::size_t y, std::size_t first, std::siz
     const int cell_bits = 32 - m_bits;
     const std::uint32_t seed = hash(m_seed ^ hash(static_cast<std::uint32_t>(cell >> cell_bits) + 1));
     const auto within = static_cast<std::uint32_t>(cell & ((std::uint64_t{1} << cell_bits) - 1));
-    const Bits block = sequence(shuffle(within, hash(seed)) << m_bits);
+    const std::uint32_t shuffled = shuffle(within, hash(seed));
+    const Bits block = sequence(shuffled << m_bits | start(shuffled));
     for (std::size_t d = 0; d < dimensions; ++d) {
         // Sobol's points are linear over GF(2): a block is its first point plus (xor) the points of block 0.
         double* const into = &(d < 2 ? front : back)->x + d % 2;
         scatter_bits(into, m_offsets[d].data() + first, block[d],
                      hash(seed + 0x9e3779b9u * static_cast<std::uint32_t>(d + 1)), count);
     }
+}
+
+// The point with which a cell begins; its others follow as i xor this one, and the first 2^k of them stay evenly spread.
+// Cells that take only a part of their points then take all points equally often: none is left out everywhere.
+std::uint32_t GridSobol::start(std::uint32_t shuffled) const
+{
+    return m_bits == 0 ? 0 : hash(shuffled ^ 0x68bc21ebu) & ((1u << m_bits) - 1u);
 }
 
 // Permutes the cell numbers so that aligned blocks of 4^k cells stay together.

@@ -31,6 +31,7 @@ private:
     using Bits = std::array<std::uint32_t, dimensions>;  // binary fractions; the lowest bit is the first digit
 
     static Bits sequence(std::uint32_t index);
+    std::uint32_t start(std::uint32_t shuffled) const;
     std::uint32_t shuffle(std::uint32_t cell, std::uint32_t seed) const;
 
     std::uint32_t m_seed;

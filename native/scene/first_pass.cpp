@@ -1,7 +1,9 @@
 #include "scene/first_pass.h"
 
 #include <algorithm>
+#include <bit>
 #include <cmath>
+#include <numbers>
 
 namespace beamspread {
 
@@ -84,14 +86,16 @@ std::size_t FirstPass::even_rays(double blocked) const
         return m_max_rays;
     const double noise = noise_scale * std::pow(2.0 * blocked, 0.25) / (2.0 * (1.0 - blocked));
     const double wanted = std::pow(noise, noise_power) * static_cast<double>(m_max_rays);
-    return std::clamp(static_cast<std::size_t>(std::ceil(wanted)), m_first_rays, m_max_rays);
+    // The nearest power of two, see `RaySettings::rays`.
+    const auto nearest = std::bit_floor(static_cast<std::size_t>(std::ceil(wanted * std::numbers::sqrt2)));
+    return std::clamp(nearest, m_first_rays, m_max_rays);
 }
 
 std::size_t FirstPass::guided_rays(double visible, std::size_t x, std::size_t y) const
 {
     const double brightness = visible * m_search.open_brightness(x, y);
     const double share = std::clamp(brightness / full_brightness, min_share, 1.0);
-    return static_cast<std::size_t>(std::ceil(share * static_cast<double>(m_max_rays)));
+    return std::bit_ceil(static_cast<std::size_t>(std::ceil(share * static_cast<double>(m_max_rays))));
 }
 
 void FirstPass::Row::find(const FirstPass& pass, std::size_t y)

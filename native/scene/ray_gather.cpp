@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <array>
+#include <bit>
 #include <numeric>
 #include <optional>
 #include <string>
@@ -45,8 +46,8 @@ public:
           m_open(grid, m_light),
           m_occluders(occluders),
           m_with_travel(settings.with_travel),
-          m_ray_count(static_cast<std::size_t>(settings.rays)),
-          m_even_rays(std::min(static_cast<std::size_t>(settings.even_rays), m_ray_count)),
+          m_ray_count(std::bit_floor(static_cast<std::size_t>(settings.rays))),
+          m_even_rays(std::bit_floor(std::min(static_cast<std::size_t>(settings.even_rays), m_ray_count))),
           m_sobol(m_ray_count, settings.seed),
           m_even_sobol(std::max<std::size_t>(m_even_rays, 1), settings.seed),
           m_rays(grid, occluders, settings.clearance)
