@@ -347,6 +347,14 @@ def light_color(light) -> tuple[float, float, float]:
     return color
 
 
+def alpha_is_straight(image) -> bool:
+    """True if Cycles takes the colors of an image's pixels as not multiplied by alpha.
+
+    Its mode says so in Blender 5.2 (measured); before, those of bytes are and those of floats are not, in any mode.
+    """
+    return image.alpha_mode == "STRAIGHT" if bpy.app.version >= (5, 2, 0) else not image.is_float
+
+
 def read_pass(render_pass, width: int, height: int) -> np.ndarray:
     """Float32 (height, width, channels) of a render pass, row 0 at the bottom."""
     values = np.empty((width * height, render_pass.channels), np.float32)

@@ -11,6 +11,7 @@ import numpy as np
 
 from ...core.errors import MissingImageError, NotSupportedError
 from ...core.scene.sampling import bilinear, nearest
+from .. import compat
 from .node_math import rotation_matrix
 from .nodes import InputSocket, Links, Source
 
@@ -228,9 +229,10 @@ def color_of(node, stored: np.ndarray) -> np.ndarray:
     if image.alpha_mode not in ("NONE", "CHANNEL_PACKED") and not is_data:
         # Cycles works with associated alpha, and divides by it if the node's alpha is used.
         wants_straight = "Alpha" in node.outputs and node.outputs["Alpha"].is_linked
-        if image.is_float and wants_straight:
+        is_straight = compat.alpha_is_straight(image)
+        if wants_straight and not is_straight:
             color = color / np.where(alpha > 0, alpha, 1)
-        elif not image.is_float and not wants_straight:
+        elif is_straight and not wants_straight:
             color = color * alpha
     if not (is_data or image.is_float or image.colorspace_settings.name.startswith("Linear")):
         color = from_srgb(color)

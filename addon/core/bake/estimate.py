@@ -240,13 +240,18 @@ def _rays(
     lights = [light for light in lights if not light.is_behind(grid)]
     if settings.layer in WITHOUT_MEDIUM:
         rays = min(RAYS_PER_SAMPLE * settings.samples**2, MAX_RAYS_BY_SAMPLES)
-        return rays, [(light, rays) for light in lights]
+        return _traced(rays), [(light, _traced(rays)) for light in lights]
     rays = rays_per_texel(grid, surface.material, settings)
     if len(lights) == 1 or not any(light.has_size for light in lights):
-        return rays, [(light, max(rays * (1 - unknown), MIN_RAYS)) for light in lights]
+        return _traced(rays), [(light, _traced(rays * (1 - unknown))) for light in lights]
     means = [mean_open_irradiance(grid, [light], SURVEY_TEXELS) for light in lights]
     total = sum(means) / (1 - unknown) or 1.0
-    return rays, [(light, max(rays * mean / total, MIN_RAYS)) for light, mean in zip(lights, means)]
+    return _traced(rays), [(light, _traced(rays * mean / total)) for light, mean in zip(lights, means)]
+
+
+def _traced(rays: float) -> float:
+    """Rays that are traced where so many are wanted: a power of two."""
+    return 2.0 ** math.floor(math.log2(max(rays, MIN_RAYS)))
 
 
 def simulation_seconds(media: Sequence, settings: BakeSettings, is_bent: bool = False) -> float:
