@@ -441,7 +441,9 @@ def test_live_follows_the_instance(live):
     holder, _, _ = nested()
     image = bpy.data.images.new("Target", 64, 64, float_buffer=True, alpha=False)
     material = bpy.data.materials["Medium"]
-    scenes.node_of(material).image = image
+    node, output = scenes.node_of(material), material.node_tree.nodes.new("ShaderNodeOutputMaterial")
+    node.image = image
+    material.node_tree.links.new(node.outputs[0], output.inputs["Surface"])
     scenes.add_sun(30, 20)
     bpy.context.scene.beamspread.use_live = True
     settle()
