@@ -154,7 +154,7 @@ def row():
 
 def vertex(name):
     mesh = bpy.data.objects[name].data
-    mesh.vertices[2].co.x += 0.1
+    mesh.vertices[2].co.x += 0.3
     mesh.update()
 
 
