@@ -97,15 +97,6 @@ def changed_objects(before: str, now: Parts) -> str:
     return ", ".join(f"'{name}'" for name in changed[:MAX_NAMED]) + more
 
 
-def added_objects(before: str, now: Parts) -> list[str]:
-    """Names of objects that are new since a bake with this part `OTHERS`; none if others changed, too, or are gone."""
-    _, *count, known = before.partition(f" {EACH}")
-    baked = set(known.split())
-    if not any(count) or len(now.objects) > MAX_OBJECTS or not baked <= set(now.objects):
-        return []
-    return sorted(name for number, name in now.objects.items() if number not in baked)
-
-
 def _each_of(others: Iterable[str]) -> list[str]:
     """The digest of each of the other objects, unless there are too many."""
     numbers = sorted(others)

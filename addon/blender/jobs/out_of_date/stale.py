@@ -40,7 +40,7 @@ from ..announced import MAX_TARGETS, announce
 from ..frozen import frozen
 from ..problems import problems_of
 from ..state import Row, Status, redraw, state
-from .fingerprint import IMAGE, OTHERS, QUALITY, Parts, added_objects, changed_objects, fingerprints, image_part
+from .fingerprint import IMAGE, OTHERS, QUALITY, Parts, changed_objects, fingerprints, image_part
 
 REST_SECONDS = 0.3
 """Seconds without changes before a scan."""
@@ -174,24 +174,12 @@ def _row(target: Target, image, record: Record | None, now: Parts | None) -> Row
         return Row(target, Status.NEVER)
     subject, unknown = str(target), () if record.is_comparable() else (note(str(target), *UNKNOWN),)
     earlier = (*_why_later(image), *record.messages(), *unknown)
-    copies = _copies(target, record, now) if changed == [OTHERS] else []
-    if copies:
-        named = ", ".join(f"'{name}'" for name in copies)
-        text = f"Duplicated since its bake: {named}. Bake again for the shadows and the light of the duplicates."
-        earlier, changed = (note(subject, text), *earlier), []
     if changed and changed != [QUALITY]:
         why = warning(subject, f"Changed since its bake: {_named(changed, record, now)}.")
         return Row(target, Status.STALE, (why, *earlier), True)
     again = [warning(subject, _why_again(record.parts[QUALITY], now[QUALITY]))] if changed else []
     status = Status.WARNED if any(message.level == Level.WARNING for message in (*again, *earlier)) else Status.BAKED
-    return Row(target, status, (*again, *earlier), bool(changed or copies))
-
-
-def _copies(target: Target, record: Record, now: Parts) -> list[str]:
-    """Names of new objects with the target's material, if nothing else has changed: mostly duplicates on their way."""
-    added, objects = added_objects(record.parts[OTHERS], now), bpy.context.scene.objects
-    has_material = [target.material_name in objects[name].material_slots for name in added if name in objects]
-    return added if added and all(has_material) else []
+    return Row(target, status, (*again, *earlier), bool(changed))
 
 
 def _changed(record: Record, now: Parts) -> list[str]:
