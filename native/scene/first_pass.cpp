@@ -40,7 +40,7 @@ void FirstPass::note(std::size_t x, std::size_t y, std::span<const std::uint8_t>
     FirstRays sum;
     for (std::size_t i = 0; i < rays.size(); ++i) {
         const float visible = rays[i].open > 0.0f ? std::min(rays[i].irradiance / rays[i].open, 1.0f) : 0.0f;
-        m_texels[y * m_width + x + i] = {met[i], static_cast<std::uint8_t>(std::ceil(255.0f * visible))};
+        m_texels[y * m_width + x + i] = {met[i], visible};
         sum.traced += rays[i].traced;
         sum.open += rays[i].open;
         sum.irradiance += rays[i].irradiance;
@@ -56,7 +56,7 @@ FirstPass::Around FirstPass::around(std::size_t x, std::size_t y) const
         for (std::size_t column = x > 0 ? x - 1 : 0; column <= std::min(x + 1, m_width - 1); ++column) {
             const Texel& texel = m_texels[row * m_width + column];
             sum.met |= texel.met;
-            sum.visible += static_cast<double>(texel.visible) / 255.0;
+            sum.visible += static_cast<double>(texel.visible);
             ++texels;
         }
     // One ray more may get through, or be blocked.

@@ -62,7 +62,7 @@ private:
     // First rays of a texel.
     struct Texel {
         std::uint8_t met = Met::nothing;
-        std::uint8_t visible = 0;  // part of the light that arrives, in steps of 1 / 255, rounded up
+        float visible = 0.0f;  // part of the light that arrives
     };
 
     // Obstacles and light of a texel and its neighbors, and the parts of the light that may arrive and be blocked.

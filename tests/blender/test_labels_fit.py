@@ -62,7 +62,7 @@ class Recorder:
 
 
 def drawn(preset: str, mode: str) -> Recorder:
-    """What a panel draws of a node."""
+    """The labels and fields that a panel draws for a node."""
     material = bpy.data.materials.new("Drawn")
     material.use_nodes = True
     node = material.node_tree.nodes.new(BeamspreadNode.bl_idname)

@@ -366,7 +366,7 @@ def test_messages_name_textures_that_live_cannot_evaluate():
 
 
 def test_a_node_that_its_material_does_not_show_is_named():
-    """As a new node beside the former shader: the view would show nothing of Live, without a word."""
+    """A new node may stand beside the former shader, which the view then shows in place of Live's picture."""
     _plane, _lamp, material = make_scene()
     settle()
     assert not any("not shown" in message.line() for message in timer.messages())

@@ -75,12 +75,17 @@ WalkShares::WalkShares(const std::vector<View2D<const float>>& lights, const Sub
             sums[i] += shares[i];
         }
     }
+    divide_by(sums);
+    even_out();
+    round();
+}
+
+void WalkShares::divide_by(const std::vector<double>& sums)
+{
     for (std::vector<float>& shares : m_shares)
         for (std::size_t i = 0; i < shares.size(); ++i)
             if (shares[i] > 0.0f)
                 shares[i] /= static_cast<float>(sums[i]);
-    even_out();
-    round();
 }
 
 // Rounds the shares to steps, and makes those of each run sum up to 1 again.
@@ -94,10 +99,7 @@ void WalkShares::round()
                     std::exp2(std::round(share_steps * std::log2(static_cast<double>(shares[i]))) / share_steps));
                 sums[i] += static_cast<double>(shares[i]);
             }
-    for (std::vector<float>& shares : m_shares)
-        for (std::size_t i = 0; i < shares.size(); ++i)
-            if (shares[i] > 0.0f)
-                shares[i] = static_cast<float>(static_cast<double>(shares[i]) / sums[i]);
+    divide_by(sums);
 }
 
 // Each sublattice draws as many walks of a light as any of its runs follow: where there are few runs, most shares come

@@ -21,6 +21,7 @@ public:
     std::size_t most(std::size_t light, std::size_t all) const;
 
 private:
+    void divide_by(const std::vector<double>& sums);  // [row, run]
     void even_out();
     void round();
 
