@@ -128,7 +128,7 @@ def test_it_stays_and_answers_as_a_fresh_process():
 CHILD = """
 import json, sys, time
 import numpy as np
-mark = sys.argv[-2]
+mark = sys.argv[sys.argv.index("--") + 1]
 for path in sys.stdin:
     request = json.load(open(path.strip()))
     time.sleep(0.6)
@@ -228,7 +228,24 @@ def test_nothing_is_left_of_an_orphan_whose_folder_went_before_it_began(tmp_path
     """A window may be closed right after a bake has asked for Cycles."""
     program = [bpy.app.binary_path, "-b", "--factory-startup", "--python"] if bpy.app.binary_path else [sys.executable]
     environment = os.environ | {"TMPDIR": str(tmp_path)}
-    child = subprocess.Popen([*program, str(process.CHILD), "--", "mark", "60"], stdin=subprocess.PIPE, env=environment)
+    words = [str(process.CHILD), "--", "mark", "60", str(os.getpid())]
+    child = subprocess.Popen([*program, *words], stdin=subprocess.PIPE, env=environment)
+    child.stdin.close()
+    assert child.wait(60) == 0
+    assert [path.name for path in tmp_path.iterdir() if not path.name.startswith("pulse-")] == []
+
+
+@IS_POSIX
+def test_an_orphan_whose_parent_ended_before_it_began_removes_its_folder(tmp_path):
+    """Where the parent ends too soon to remove what it has just made: a window closed right after a bake began."""
+    gone = subprocess.Popen([sys.executable, "-c", ""])
+    gone.wait()
+    folder = tmp_path / f"{PREFIX}{gone.pid}-abc"
+    folder.mkdir()
+    program = [bpy.app.binary_path, "-b", "--factory-startup", "--python"] if bpy.app.binary_path else [sys.executable]
+    words = [str(process.CHILD), "--", "mark", "60", str(gone.pid)]
+    environment = os.environ | {"TMPDIR": str(folder)}
+    child = subprocess.Popen([*program, *words], stdin=subprocess.PIPE, env=environment)
     child.stdin.close()
     assert child.wait(60) == 0
     assert [path.name for path in tmp_path.iterdir() if not path.name.startswith("pulse-")] == []
@@ -271,7 +288,8 @@ def test_escape_while_the_world_renders_leaves_nothing(tmp_path, monkeypatch):
 @IS_POSIX
 def test_an_orphan_without_work_ends():
     program = [bpy.app.binary_path, "-b", "--factory-startup", "--python"] if bpy.app.binary_path else [sys.executable]
-    child = subprocess.Popen([*program, str(process.CHILD), "--", "mark", "60"], stdin=subprocess.PIPE)
+    words = [str(process.CHILD), "--", "mark", "60", str(os.getpid())]
+    child = subprocess.Popen([*program, *words], stdin=subprocess.PIPE)
     time.sleep(0.2)
     child.stdin.close()
     assert child.wait(30) == 0

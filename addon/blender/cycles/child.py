@@ -1,10 +1,11 @@
-"""Program of the child process, in Blender or with Blender as a module: child.py -- MARK IDLE_SECONDS
+"""Program of the child process, in Blender or with Blender as a module: child.py -- MARK IDLE_SECONDS PARENT
 
 Each line of its input is the path of a request (JSON), until the input ends. The process opens the copy of the scene
 that the request names, does the task, which may change anything in memory, and writes the arrays that the task returns,
 by name, to the file that the request names. Opening a copy resets all data, so requests don't depend on earlier ones.
 
-The process ends at the first error, without requests for some time, and when its parent ends in any way.
+The process ends at the first error, without requests for some time, and when its parent ends in any way. PARENT is the
+parent's process number: one that ended before Python began here can't be asked for.
 """
 
 import importlib
@@ -132,9 +133,9 @@ def restore_images(file: Path) -> None:
 class Requests(threading.Thread):
     """Reads paths of requests, also while Cycles renders, and ends the process with the input."""
 
-    def __init__(self) -> None:
+    def __init__(self, parent: int) -> None:
         super().__init__(daemon=True)
-        self.paths, self._parent = queue.SimpleQueue(), os.getppid()
+        self.paths, self._parent = queue.SimpleQueue(), parent
         _wake_at_input()
         self.start()
 
@@ -199,14 +200,14 @@ def answer(request: dict, say) -> None:
 
 def main() -> int:
     """Answer requests; the exit code."""
-    mark, idle_seconds = sys.argv[sys.argv.index("--") + 1 :]
+    mark, idle_seconds, parent = sys.argv[sys.argv.index("--") + 1 :]
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C is for the parent
 
     def say(news) -> None:
         sys.stdout.write(f"\n{mark} {news}\n")
         sys.stdout.flush()
 
-    requests = Requests()
+    requests = Requests(int(parent))
     if not bpy.app.binary_path:
         bpy.ops.wm.read_factory_settings(use_empty=True)
     while True:

@@ -177,7 +177,7 @@ class _Process:
 
 
 def _command(binary: str) -> list[str]:
-    words = [str(CHILD), "--", MARK, str(IDLE_SECONDS)]
+    words = [str(CHILD), "--", MARK, str(IDLE_SECONDS), str(os.getpid())]
     if not binary:  # Blender as a module
         return [sys.executable, *words]
     return [binary, "-b", "--factory-startup", "--python-exit-code", "3", "--python", *words]
