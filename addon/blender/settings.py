@@ -43,8 +43,8 @@ class BeamspreadSettings(bpy.types.PropertyGroup):
     )
     texel_density: FloatProperty(
         name="Texel Density",
-        description="Set the pixels per meter of new images, whose longer side has 512 to 2048 pixels. The spread "
-        "of light may ask for up to 4096; bent surfaces on which it is smooth get fewer",
+        description="Set the pixels per meter of new images. Their longer side has 512 to 2048 pixels: up to 4096 "
+        "where light spreads over short distances, and fewer on curved surfaces whose light is smooth",
         default=512.0,
         min=0.01,
         soft_min=16.0,
@@ -126,8 +126,8 @@ class BeamspreadSettings(bpy.types.PropertyGroup):
         name="Margin Type",
         description="Choose what fills the margin",
         items=[
-            ("EXTEND", "Extend", "Each UV island goes on as at its border", 0),
-            ("ADJACENT_FACES", "Adjacent Faces", "Light of the face on the other side of the UV border", 1),
+            ("EXTEND", "Extend", "The colors at the border of each UV island go on", 0),
+            ("ADJACENT_FACES", "Adjacent Faces", "The colors of the face on the other side of the UV border go on", 1),
         ],
         default="EXTEND",
     )
@@ -187,7 +187,7 @@ class BeamspreadSettings(bpy.types.PropertyGroup):
     use_udim: BoolProperty(
         name="UDIM Tiles",
         description="Give new images a tile for each unit square of the UV map that an object uses, in files "
-        "NAME.<UDIM>.exr. Else an object whose UVs leave the image gets a UV map of its own",
+        "NAME.<UDIM>.exr. Off: an object whose UVs leave the image gets a UV map of its own",
         default=False,
     )
     use_view_transform: BoolProperty(
@@ -207,7 +207,7 @@ class BeamspreadSettings(bpy.types.PropertyGroup):
     use_live: BoolProperty(
         name="Live",
         description="Preview the bake while you change lights, objects and materials. Nodes show a hidden image; "
-        "their own one does not follow. Switch off to see the last bake again",
+        "their own image keeps the last bake. Switch off to see the last bake again",
         default=False,
     )
     format: EnumProperty(

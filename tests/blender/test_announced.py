@@ -178,6 +178,41 @@ def test_few_rays_find_about_as_much_bounced_light_as_the_bake(gray, radius):
     assert part / 1.3 < announced_part < 1.3 * part
 
 
+def test_rays_are_announced_where_obstacles_are_alone():
+    """A bake traces few rays where all of a light's arrive, or none; in the panel as in the bake."""
+
+    def share(size):
+        for name in ("Card", "Lamp"):
+            if name in bpy.data.objects:
+                bpy.data.objects.remove(bpy.data.objects[name])
+        add_lamp((0, 0, 1.0), radius=0.3)
+        add_plane("Card", size, Matrix.Translation((0, 0, 0.4)))
+        stale.refresh(bpy.context)
+        return state.announced[name_of].around.shares[0]["Lamp"]
+
+    (name_of,) = find_targets([plane()])
+    beside, covered = share((0.5, 0.5)), share((40.0, 40.0))
+    assert beside > 0.1
+    assert covered == 0
+    (plan,) = read_scene(bpy.context, [name_of])
+    assert plan.bake(bpy.context.scene.beamspread.for_bake()).job.surroundings.shares == ({"Lamp": 0.0},)
+
+
+def test_objects_without_shadow_block_no_light_of_lamps():
+    """A flame around its lamp."""
+    bpy.context.scene.beamspread.use_indirect = True
+    (name,) = find_targets([plane()])
+    add_lamp((0, 0, 1.0))
+    bpy.ops.mesh.primitive_cube_add(size=0.2, location=(0, 0, 1.0))
+    parts = []
+    for casts in (True, False):
+        bpy.context.object.visible_shadow = casts
+        bpy.context.view_layer.update()
+        stale.refresh(bpy.context)
+        parts.append(state.announced[name].around.lit)
+    assert parts == [0, 1]
+
+
 def test_measured_times_correct_the_line():
     add_lamp((0, 0, 1))
     one = plane()

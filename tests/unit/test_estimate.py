@@ -6,7 +6,14 @@ from dataclasses import replace
 import pytest
 from beamspread import Medium
 from beamspread.core.bake import steps
-from beamspread.core.bake.estimate import Workload, channels_of, parallel_seconds, simulation_seconds
+from beamspread.core.bake.estimate import (
+    Workload,
+    channels_of,
+    parallel_seconds,
+    share_of_rays,
+    simulation_seconds,
+    traced_rays,
+)
 from beamspread.core.bake.forecast import Finders, Forecast, seconds_of, steps_of_bakes
 from beamspread.core.bake.pace import Estimate, Pace, pace
 from beamspread.core.bake.spread_light import MIN_RAYS
@@ -68,6 +75,40 @@ def test_lights_of_a_size_share_rays_by_their_brightness():
 
 def test_lights_behind_the_receiver_take_no_time():
     assert workload([replace(POINT, position=(0.0, 0.0, -1.0))]).lamps == 0
+
+
+def test_a_texel_traces_few_rays_where_all_or_nothing_is_blocked():
+    """Numbers of rays of native/scene/first_pass.cpp for 512 rays: 8 first ones, and up to all beside obstacles."""
+    assert share_of_rays(None) == share_of_rays(0.0) == share_of_rays(1.0) == 0
+    assert share_of_rays(0.5) == share_of_rays(0.9) == 1
+    few, some = share_of_rays(0.02), share_of_rays(0.2)
+    assert 1 / 8 < few < some < 1
+    assert traced_rays(512, 0.0) == MIN_RAYS
+    assert traced_rays(512, 1.0) == 512 + MIN_RAYS
+    assert traced_rays(MIN_RAYS, 1.0) == MIN_RAYS
+
+
+def test_rays_beside_obstacles_take_the_time():
+    """Light that is blocked nowhere, or everywhere, is found by few rays."""
+    fine = Surface(replace(MATERIAL, mean_free_path=(1e-6,) * 3))  # which blurs no noise
+    open_load, blocked = (
+        Workload.of([square(256)], [AREA], 500, fine, SETTINGS, shares={"Area": share}) for share in (0.0, 1.0)
+    )
+    assert blocked.broad_traced > 10 * open_load.broad_traced
+    assert open_load.seconds(SETTINGS) < 0.5 * blocked.seconds(SETTINGS)
+    unknown = workload([AREA], triangles=500, surface=fine)
+    assert open_load.seconds(SETTINGS) < unknown.seconds(SETTINGS) < blocked.seconds(SETTINGS)
+
+
+def test_a_surface_that_bends_has_no_lights_behind():
+    """A plane stands for it until its mesh is read."""
+    behind = replace(AREA, position=(0.0, 0.0, -1.0))
+    ways = (
+        Forecast("Plane", [square(256)], [behind], 0, Surface(MATERIAL), is_bent=is_bent).steps(SETTINGS)
+        for is_bent in (False, True)
+    )
+    flat, bent = (seconds_of(steps) for steps in ways)
+    assert bent > 2 * flat
 
 
 def test_slow_solvers_take_longer():

@@ -28,7 +28,7 @@ from ...core.bake.estimate import cycles_light_seconds
 from ...core.bake.job import BakeJob, Step
 from ...core.bake.mean_light import mean_irradiance, mean_open_irradiance
 from ...core.bake.smoothing import SPLINE_VARIANCE, smoothing_variance
-from ...core.bake.surroundings import bounced_seconds_of_cycles, corners_of, enclosed_part, surroundings_of
+from ...core.bake.surroundings import bounced_seconds_of_cycles, corners_of, enclosed_part
 from ...core.errors import MissingImageError
 from ...core.messages import Message, note, warning
 from ...core.progress import Callback, Progress
@@ -207,7 +207,7 @@ class LightByCycles(Step):
         renders_world = bool(self.world) and self.copy.panorama is None
         bounced = 0.0
         if self.bounced:
-            around = surroundings_of(job.grids, job.illumination, self.finds_world)
+            around = job.surroundings
             bounced = bounced_seconds_of_cycles(around, node_count(job.lit_grids), job.receiver.is_bent)
         return cycles_light_seconds(renders_world, len(self.lamps), bounced, job.illumination.triangle_count)
 

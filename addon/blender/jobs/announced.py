@@ -48,6 +48,9 @@ REFLECTANCE, GLOW = 0.5, 5.0
 # Largest numbers of triangles and of objects among which rays are traced. More keep the window waiting.
 MAX_TRACED, MAX_TRACED_OBJECTS = 300_000, 500
 
+# Largest number of glowing objects that estimates count: rays to more are shared.
+MAX_GLOWING = 32
+
 # Shortest simulation that a line names, seconds.
 MIN_SIMULATION = 1.0
 
@@ -107,7 +110,7 @@ class _SceneFacts:
         self._boxes: list[tuple] = []
         visible = render_visible_names(view_layer)
         shown = (obj for obj in scene.objects if obj.name in visible)
-        self._glowing = False
+        self._glowing = 0
         for obj, matrix, instancer in placed(depsgraph, shown):
             if obj.type == "LIGHT" and lights_surfaces(obj, instancer) and not is_portal(obj.data):
                 self._add_lamp(obj, matrix)
@@ -132,7 +135,7 @@ class _SceneFacts:
         low, high = np.array(obj.bound_box[0]), np.array(obj.bound_box[6])
         self._boxes.append((matrix[:3, :3] @ (low + high) / 2 + matrix[:3, 3], matrix[:3, :3] * (high - low) / 2))
         kinds = [_kinds(slot.material.original) for slot in obj.material_slots if slot.material is not None]
-        self._glowing |= any(kind.glows for kind in kinds)
+        self._glowing += any(kind.glows for kind in kinds)
         reflects = not kinds or any(kind.color is None for kind in kinds)
         is_seen = obj.visible_diffuse and obj.visible_shadow
         self.is_traceable &= all(kind.is_known for kind in kinds) and (is_seen or not reflects)
@@ -144,7 +147,7 @@ class _SceneFacts:
         self.world_by_cycles = not kinds.is_known
         color = tuple(world.color) if plain else kinds.color
         has_image = kinds.glows and kinds.is_known and color is None and not kinds.asks_path
-        self.unknown = OF_WORLD if has_image else OF_MESHES * self._glowing
+        self.unknown = OF_WORLD if has_image else OF_MESHES * (self._glowing > 0)
         if color is not None and any(color):
             rows = tuple(map(tuple, np.eye(3).tolist()))
             self.lights.append(WorldLight("World", 1.0, color, True, np.ones((1, 1, 3), np.float32), rows))
@@ -160,7 +163,11 @@ class _SceneFacts:
         """Surroundings of a target: by rays that Blender traces, or by boxes in large scenes."""
         if self.triangles <= MAX_TRACED and len(self._boxes) <= MAX_TRACED_OBJECTS:
             side = 1.0 if target.side == FRONT else -1.0
-            return self._tracer.around(target.obj, side, self.world_by_cycles or self.unknown == OF_WORLD)
+            has_unknown_sky = self.world_by_cycles or self.unknown == OF_WORLD
+            around = self._tracer.around(target.obj, side, has_unknown_sky)
+            sides = (side, -side) if target.node.surface().thickness > 0 else (side,)
+            shares = tuple(self._tracer.shares(target.obj, one, has_unknown_sky) for one in sides)
+            return replace(around, shares=shares)
         obj = target.obj
         own = np.array(obj.bound_box) @ np.array(obj.matrix_world)[:3, :3].T + np.array(obj.matrix_world)[:3, 3]
         normal = None if grid is None else np.array(grid.normal)
@@ -198,6 +205,7 @@ class _SceneFacts:
         scatters = is_textured and target.node.texture_use().is_scattered
         rest = finders, self.unknown, shape.is_bent, shape.pieces, scatters
         grids = [grid_of_bent(grid, shape) if shape.is_bent else grid]
+        rest += 0 if shape.is_bent else shape.planes, min(self._glowing, MAX_GLOWING)
         return Forecast(obj.name, grids, self.lights, self.triangles, surface, *rest)
 
 

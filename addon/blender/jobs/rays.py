@@ -8,8 +8,9 @@ from collections.abc import Callable, Sequence
 import numpy as np
 from mathutils import Vector
 
+from ...core.bake.estimate import SKY, share_of_rays
 from ...core.bake.surroundings import Surroundings, directions_of
-from ...core.scene.lights import AreaLight, Light, SpotLight, WorldLight
+from ...core.scene.lights import AreaLight, Light, SpotLight, SunLight, WorldLight
 
 # Places on an object from which rays start, if there are few objects, the fewest, and their sum over all objects; and
 # directions from each. More: surer, slower scans.
@@ -21,9 +22,16 @@ MANY_ON_FACE, GOLDEN = 5, 0.618034
 # Lamps to which shadow rays go from a point; of more, so many are drawn. More: surer, slower scans.
 MAX_LAMPS = 8
 
+# Rays from a place to each light with a size, and places for each one from which other rays start. More: surer, slower
+# scans.
+LIGHT_RAYS, MORE_PLACES = 16, 3
+
 # Length that keeps a ray off the surface from which it starts, relative to the size of the object, or to the length of
 # the ray that has met it.
 LIFT, LIFT_OF_HIT = 1e-3, 1e-4
+
+# Most surfaces without a shadow that a ray crosses.
+MAX_CROSSINGS = 16
 
 # Length of a ray without an end; Blender takes single precision.
 FAR = 1e9
@@ -56,10 +64,11 @@ class Tracer:
 
         `has_unknown_sky`: True if the sky gives light of a strength that is not known: it counts as much as the lamps.
         """
-        places, normals = self._places_on(obj.evaluated_get(self._depsgraph), side)
+        places, normals = self._places_on(obj.evaluated_get(self._depsgraph), side, self._places)
         if not len(places):
             return Surroundings()
-        arriving, open_light = np.array([self._of_lamps(*at) for at in zip(places, normals)]).T
+        more = self._places_on(obj.evaluated_get(self._depsgraph), side, MORE_PLACES * self._places)
+        arriving, open_light = np.array([self._of_lamps(*at) for at in zip(*more)]).T
         sky = self._sky + has_unknown_sky * (float(open_light.mean()) or 1.0)
         count = len(places) * DIRECTIONS
         direct, bounced = float(arriving.mean()), []
@@ -78,6 +87,38 @@ class Tracer:
         enclosed = len(bounced) / count
         lit = float(arriving.sum() / open_light.sum()) if open_light.any() else 1.0 - enclosed
         return Surroundings(enclosed, lit, returned)
+
+    def shares(self, obj, side: float, has_unknown_sky: bool) -> dict[str, float]:
+        """Share of the rays to each light of a size that a bake traces beyond the first ones, by the light's name.
+
+        Nothing blocks the other rays, or everything. The sky has the name `SKY`. `side`, `has_unknown_sky`: as for
+        `around`.
+        """
+        places, normals = self._places_on(obj.evaluated_get(self._depsgraph), side, MORE_PLACES * self._places)
+        sky = [(SKY, None)] if self._sky or has_unknown_sky else []
+        lamps = [lamp for lamp in self._lamps if lamp.has_size]
+        if len(lamps) > MAX_LAMPS:
+            lamps = [lamps[number] for number in np.linspace(0, len(lamps) - 1, MAX_LAMPS).astype(int)]
+        found = {}
+        for name, lamp in [*sky, *((lamp.name, lamp) for lamp in lamps)]:
+            if lamp is not None and not lamp.cast_shadow:
+                found[name] = 0.0
+            elif len(places):
+                parts = [self._blocked(lamp, *at, number) for number, at in enumerate(zip(places, normals))]
+                found[name] = float(np.mean([share_of_rays(part) for part in parts]))
+        return found
+
+    def _blocked(self, lamp: Light | None, place: np.ndarray, normal: np.ndarray, turn: float) -> float | None:
+        """Part of a lamp's light, or of an even sky's, that is blocked on its way to a place; None if it is behind."""
+        start, arriving, blocked = Vector(place), 0.0, 0.0
+        for ray, distance in _towards(lamp, place, normal, turn):
+            cosine = float(ray @ normal)
+            if cosine > 0:
+                # Rays to an even sky follow the cosine.
+                weight = 1.0 if lamp is None else cosine
+                arriving += weight
+                blocked += weight * self._is_blocked(start, ray, distance)
+        return blocked / arriving if arriving else None
 
     def _irradiance(self, point: np.ndarray, normal: np.ndarray, sky: float) -> float:
         """Irradiance of a surface that a ray has met: of lamps, and from one direction of the hemisphere."""
@@ -102,7 +143,7 @@ class Tracer:
             irradiance, direction, distance = _from_lamp(lamp, point, normal)
             if irradiance > 0:
                 open_light += factor * irradiance
-                is_lit = not lamp.cast_shadow or not self._cast(point, direction, distance)[0]
+                is_lit = not lamp.cast_shadow or not self._is_blocked(point, direction, distance)
                 arriving += factor * irradiance * is_lit
         return arriving, open_light
 
@@ -119,28 +160,40 @@ class Tracer:
             self._looks[obj.name] = self._look_of(obj)
         return np.array(point) + lift * normal, normal, self._looks[obj.name]
 
+    def _is_blocked(self, start, direction, distance: float) -> bool:
+        """True if an object that casts shadows stands in the way."""
+        for _ in range(MAX_CROSSINGS):
+            is_hit, point, _, _, obj, _ = self._cast(start, direction, distance)
+            if not is_hit or obj.visible_shadow:
+                return is_hit
+            passed = (1 + LIFT_OF_HIT) * (point - Vector(start)).length
+            start, distance = Vector(start) + passed * Vector(direction), distance - passed
+            if distance <= 0:
+                return False
+        return True
+
     def _cast(self, start, direction, distance: float = FAR) -> tuple:
         scene = self._depsgraph.scene
         return scene.ray_cast(self._depsgraph, Vector(start), Vector(direction), distance=distance)
 
-    def _places_on(self, obj, side: float) -> tuple[np.ndarray, np.ndarray]:
-        """Places (N, 3) a little above some faces of an evaluated object, and the normals there.
+    def _places_on(self, obj, side: float, count: int) -> tuple[np.ndarray, np.ndarray]:
+        """About `count` places (N, 3) a little above some faces of an evaluated object, and the normals there.
 
         Each of few faces has several places.
         """
         mesh = obj.to_mesh()  # curves and text have no faces themselves
         try:
-            return self._places_on_mesh(obj, mesh, side)
+            return self._places_on_mesh(obj, mesh, side, count)
         finally:
             obj.to_mesh_clear()
 
-    def _places_on_mesh(self, obj, mesh, side: float) -> tuple[np.ndarray, np.ndarray]:
+    def _places_on_mesh(self, obj, mesh, side: float, few: int) -> tuple[np.ndarray, np.ndarray]:
         matrix = np.array(obj.matrix_world)
         if mesh is None or not len(mesh.polygons):
             return np.zeros((0, 3)), np.zeros((0, 3))
         turn = side * np.linalg.pinv(matrix[:3, :3]).T
         lift = LIFT * max(obj.dimensions)
-        places, normals, few = [], [], self._places
+        places, normals = [], []
         for number in np.unique(np.linspace(0, len(mesh.polygons) - 1, few).astype(int)).tolist():
             face = mesh.polygons[number]
             normal = turn @ np.array(face.normal)
@@ -166,6 +219,47 @@ def _spread_over(corners: np.ndarray, center: np.ndarray, count: int) -> np.ndar
 def places_for(objects: int) -> int:
     """Places on each of so many objects from which rays start."""
     return min(max(ALL_PLACES // max(objects, 1), FEWEST_PLACES), PLACES)
+
+
+def _towards(lamp: Light | None, place: np.ndarray, normal: np.ndarray, turn: float) -> list[tuple[np.ndarray, float]]:
+    """Directions of rays from a place to points all over a lamp, or to an even sky, and their lengths."""
+    if lamp is None:
+        return [(direction, FAR) for direction in directions_of(normal, LIGHT_RAYS, turn)]
+    across, up = _disk(turn)
+    if isinstance(lamp, SunLight):
+        x_axis, y_axis, z_axis = _frame(-np.array(lamp.direction))
+        radius = math.tan(0.5 * min(lamp.angle, math.pi / 2))
+        rays = z_axis + radius * (np.outer(across, x_axis) + np.outer(up, y_axis))
+        return [(ray, FAR) for ray in rays / np.linalg.norm(rays, axis=1)[:, None]]
+    if isinstance(lamp, AreaLight):
+        x_axis, y_axis = (0.5 * size * np.array(axis) for size, axis in zip((lamp.size_x, lamp.size_y), lamp.frame))
+        if not lamp.is_round:
+            number = np.arange(LIGHT_RAYS)
+            across, up = 2 * ((number + 0.5) / LIGHT_RAYS) - 1, 2 * ((number * GOLDEN + turn) % 1.0) - 1
+    else:
+        x_axis, y_axis = (lamp.radius * axis for axis in _frame(np.array(lamp.position) - place)[:2])
+    ways = np.array(lamp.position) + np.outer(across, x_axis) + np.outer(up, y_axis) - place
+    lengths = np.maximum(np.linalg.norm(ways, axis=1), 1e-9)
+    if isinstance(lamp, AreaLight):
+        # None arrives behind the lamp.
+        is_before = ways @ np.array(lamp.frame[2]) < 0
+        ways, lengths = ways[~is_before], lengths[~is_before]
+    return list(zip(ways / lengths[:, None], lengths.tolist()))
+
+
+def _disk(turn: float) -> tuple[np.ndarray, np.ndarray]:
+    """Points (LIGHT_RAYS,) spread evenly over a disk of radius 1."""
+    number = np.arange(LIGHT_RAYS)
+    radius, angle = np.sqrt((number + 0.5) / LIGHT_RAYS), number * math.pi * (3 - math.sqrt(5)) + turn
+    return radius * np.cos(angle), radius * np.sin(angle)
+
+
+def _frame(axis: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Unit vectors at right angles, the last along an axis."""
+    z_axis = axis / (float(np.linalg.norm(axis)) or 1.0)
+    x_axis = np.cross(z_axis, np.eye(3)[np.argmin(np.abs(z_axis))])
+    x_axis /= np.linalg.norm(x_axis)
+    return x_axis, np.cross(z_axis, x_axis), z_axis
 
 
 def _from_lamp(lamp: Light, point: np.ndarray, normal: np.ndarray) -> tuple[float, np.ndarray, float]:

@@ -24,6 +24,9 @@ from ..read.scene_cache import scene_cache
 MAX_FACES = 100_000
 """Number of faces of a mesh up to which their areas are read. More slow the scans of a scene down."""
 
+PLANE_DIGITS = 3
+"""Digits of normals, and of distances relative to the surface, by which planes are told apart."""
+
 
 @dataclass(frozen=True)
 class Shape:
@@ -36,6 +39,7 @@ class Shape:
     sides : of an image on a surface that bends, scene units; only their ratio counts.
     filled : part of the image that shows the faces.
     pieces : into which a texel is divided where the surface bends, on average.
+    planes : on which the faces of a surface lie that does not bend, about.
     is_hollow : True if parts of a surface that bends see each other.
     error : reason why the target can't be baked, if that is known.
     """
@@ -46,6 +50,7 @@ class Shape:
     filled: float = 1.0
     pieces: float = 1.0
     is_hollow: bool = False
+    planes: int = 1
     error: BakeError | None = None
 
 
@@ -74,7 +79,7 @@ def shape_of(target: BakeTarget, depsgraph) -> Shape:
             is_bent = bends(polygons, path, spread)
             filled = float(polygons.areas.sum()) / length**2
             if not is_bent:
-                return Shape(length, filled=filled)
+                return Shape(length, filled=filled, planes=_planes(polygons))
             facts = lengths_of_faces(polygons), filled, pieces_of_faces(polygons), _is_hollow(polygons)
             return Shape(length, is_bent, *facts)
         except BakeError as error:
@@ -82,6 +87,13 @@ def shape_of(target: BakeTarget, depsgraph) -> Shape:
 
     state = mesh_key(evaluated), node.uv_map, is_tiled, path, spread, *(tuple(row) for row in matrix)
     return scene_cache.get(("shape of image", obj, target.material.name), [obj], read, state=state)
+
+
+def _planes(polygons: Polygons) -> int:
+    """Number of planes on which faces lie, by their normals and distances from the origin."""
+    firsts = polygons.corners[polygons.starts[:-1]]
+    distances = np.einsum("nc,nc->n", firsts, polygons.normals) / (float(np.ptp(polygons.corners)) or 1.0)
+    return len(np.unique(np.round(np.column_stack([polygons.normals, distances]), PLANE_DIGITS), axis=0))
 
 
 def _is_hollow(polygons: Polygons) -> bool:

@@ -187,8 +187,8 @@ class BeamspreadNode(ColorProperties, PathProperties, bpy.types.ShaderNodeCustom
     )
     base_color: FloatVectorProperty(
         name="Base Color",
-        description="Set the color of the surface in white, uniform light. One too bright for this material becomes "
-        "the brightest that it can have",
+        description="Set the color of the surface in white, uniform light. A color that is too bright for this "
+        "material is limited to the brightest possible",
         subtype="COLOR",
         size=3,
         default=(0.6, 0.6, 0.6),

@@ -18,7 +18,7 @@ from .job import BakeJob, Step
 from .layers import WITHOUT_MEDIUM
 from .mean_light import mean_irradiance, mean_open_irradiance
 from .smoothing import SPLINE_VARIANCE, smoothing_variance
-from .surroundings import Surroundings, bounced_seconds, surroundings_of
+from .surroundings import bounced_seconds
 
 # Nodes along the longest side of a receiver, and the root of their number on a mesh that bends; more resolve bounced
 # light more finely and take longer.
@@ -58,7 +58,6 @@ class BouncedLight(Step):
     ----------
     max_bounces : largest number of surfaces that return light on its way, in all, diffusely and by a glossy lobe.
     nodes, tolerance, max_samples, max_rays : see `NODES`, `NOISE`, `MAX_SAMPLES` and `MAX_RAYS`.
-    around : surroundings of the receiver, if they are known beforehand.
     """
 
     max_bounces: tuple[int, int, int]
@@ -66,16 +65,15 @@ class BouncedLight(Step):
     tolerance: float = NOISE
     max_samples: int = MAX_SAMPLES
     max_rays: float = MAX_RAYS
-    around: Surroundings | None = None
 
     name = "Finding bounced light"
     finds_light = True
 
     def seconds(self, job: BakeJob) -> float:
-        finds_world = any(step.finds_world for step in job.steps)
-        around = self.around or surroundings_of(job.grids, job.illumination, finds_world)
         triangles, nodes = job.illumination.triangle_count, node_count(job.lit_grids, self.nodes)
-        seconds = bounced_seconds(triangles, around, nodes, job.receiver.is_bent, job.settings.threads, self.max_rays)
+        seconds = bounced_seconds(
+            triangles, job.surroundings, nodes, job.receiver.is_bent, job.settings.threads, self.max_rays
+        )
         return seconds * (BARE_TIME if _is_bare(job) else 1.0)
 
     def run(self, job: BakeJob, progress: Progress) -> BakeJob:

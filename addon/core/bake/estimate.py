@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import os
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -32,16 +32,18 @@ ANY_BAKE, ANY_PLANE = 0.05, 2e-3
 # refraction above 1 and without; and for any other light.
 SUNS, LAMPS, WIDE = 0.06e-6, (1.0e-6, 1.8e-6), (4e-6, 5e-6)
 # Seconds of the choice of terms for other light.
-CHOICE = 0.6, 1.0
+CHOICE = 0.1, 0.3
+# The same of each further plane.
+CHOICE_OF_PLANE = 0.45
 # Multiple of slabs of one mean free path with an index of refraction above 1; thicker ones come closer to 1.
 THIN_SLAB = 6.0
 
-# Seconds of a ray without obstacles; besides, of a shadow ray towards lights all around, and towards others, where
-# penumbras are small.
-OPEN_RAY, BROAD_RAY, NARROW_RAY = 0.015e-6, 0.18e-6, 0.05e-6
+# Seconds of a ray that is traced, in any case; besides, with the obstacles of `MANY_TRIANGLES`, towards lights all
+# around, and towards others.
+OPEN_RAY, BROAD_RAY, NARROW_RAY = 0.22e-6, 0.14e-6, 0.12e-6
 # Seconds per texel and lamp of the rays to a lamp without a size, and for each doubling of `MANY_TRIANGLES`: their
 # shadows have more borders.
-LAMP_RAYS, LAMP_TRIANGLES = 0.15e-6, 0.3e-6
+LAMP_RAYS, LAMP_TRIANGLES = 0.3e-6, 1.0e-6
 # Triangles of an average scene, whose shadow rays take these times. Fewer cast fewer shadows; more are traced longer.
 MANY_TRIANGLES = 1000
 
@@ -51,7 +53,7 @@ ADAPTIVE, DIRECT = (1e-6, 3e-6), (0.2e-9, 30e-9)
 # Seconds of the solution on surfaces that bend: in any case, for the tables of its media; and for each piece of a texel
 # and each channel of its own: in any case, up to a mean free path of a texel in proportion to it, and for each doubling
 # of longer ones.
-BENT, BENT_TEXEL, BENT_SHORT, BENT_LONG = 1.5, 3e-6, 45e-6, 5e-6
+BENT, BENT_TEXEL, BENT_SHORT, BENT_LONG = 1.1, 1e-6, 36e-6, 3e-6
 # Part of a surface that bends that lamps and suns light, about.
 LIT_BY_LAMPS = 0.5
 
@@ -80,6 +82,17 @@ OF_WORLD, OF_MESHES = 0.5, 0.1
 # Texels along a side at which the brightness of lights is compared. More: slower estimates.
 SURVEY_TEXELS = 8
 
+# Part of the rays to a light of a size that is traced where obstacles are and nothing else is known, about.
+SOME_BLOCKED = 0.3
+# Rays of a texel and its neighbors in the first pass, and noise beside obstacles: see native/scene/first_pass.cpp.
+RAYS_AROUND, BLOCKED_NOISE, NOISE_POWER = 72, 1.5, 1.6
+
+Shares = Mapping[str, float]
+"""Part of the rays to each light of a size that a bake traces after its first pass, by the light's name."""
+
+SKY = "*"
+"""Name of an even sky among these."""
+
 CYCLES_LIGHT, CYCLES_COLORS = "Finding light with Cycles", "Evaluating the base color"
 """Names of the steps by Cycles, see `Pace`."""
 
@@ -95,6 +108,7 @@ class Workload:
     is_bent : True if the grid is one of faces that bend.
     suns, lamps : numbers of lights of one direction, and of one direction at each texel.
     broad_rays, narrow_rays : rays of each texel to lights from all around, and to other lights of a size.
+    broad_traced, narrow_traced : number of those that are traced towards obstacles.
     bounced : True if bounced light may be added.
     pieces : into which a texel on surfaces that bend is divided, on average.
     channels : number of those whose light is computed; those of one medium under light of one color share it.
@@ -112,6 +126,8 @@ class Workload:
     lamps: int = 0
     broad_rays: float = 0.0
     narrow_rays: float = 0.0
+    broad_traced: float = 0.0
+    narrow_traced: float = 0.0
     bounced: bool = False
     pieces: float = 1.0
     channels: int = 3
@@ -131,25 +147,36 @@ class Workload:
         settings: BakeSettings,
         bounced: bool = False,
         unknown: float = 0.0,
+        shares: Shares | None = None,
+        has_all_sides: bool = False,
     ) -> Workload:
         """The workload of a bake.
 
-        `unknown`: fraction of all light, about, that comes from all around and is not among `lights`.
+        `unknown`: fraction of all light, about, that comes from all around and is not among `lights`. `shares`: None
+        if they are not known. `has_all_sides`: True if grids on planes stand for a surface that bends, behind which no
+        light is.
         """
         is_bent = any(isinstance(grid, BentGrid) for grid in grids)
         load = cls(sum(map(texels_with_images, grids)), len(grids), is_bent, bounced=bounced, triangles=triangles)
         largest = max(grids, key=lambda grid: grid.texels)
-        all_rays, shared = _rays(largest, lights, surface, settings, unknown)
-        load = replace(load, broad_rays=all_rays * (unknown if shared else math.ceil(unknown)))
+        facing = lights if has_all_sides else [light for light in lights if not light.is_behind(largest)]
+        all_rays, shared = _rays(largest, facing, surface, settings, unknown)
+        around = all_rays * (unknown if shared else math.ceil(unknown))
+        traced = traced_rays(around, _share_of(SKY, shares, triangles)) if around else 0.0
+        load = replace(load, broad_rays=around, broad_traced=traced)
         for light, rays in shared:
+            name = SKY if isinstance(light, WorldLight) and light.name not in (shares or {}) else light.name
+            traced = traced_rays(rays, _share_of(name, shares, triangles)) if light.cast_shadow else MIN_RAYS
             if light.is_parallel:
                 load = replace(load, suns=load.suns + 1)
             elif light.has_one_direction:
                 load = replace(load, lamps=load.lamps + 1)
             elif isinstance(light, AreaLight | MeshLight | WorldLight):
-                load = replace(load, broad_rays=load.broad_rays + rays)
+                both = load.broad_rays + rays, load.broad_traced + traced
+                load = replace(load, broad_rays=both[0], broad_traced=both[1])
             else:
-                load = replace(load, narrow_rays=load.narrow_rays + rays)
+                both = load.narrow_rays + rays, load.narrow_traced + traced
+                load = replace(load, narrow_rays=both[0], narrow_traced=both[1])
         if is_bent:
             load = replace(load, pieces=max(grids, key=lambda grid: grid.texels).pieces)
         material, is_unknown = surface.material, bounced or unknown > 0
@@ -182,8 +209,8 @@ class Workload:
         return (self.suns + self.lamps) * (LAMP_RAYS + LAMP_TRIANGLES * doublings * settings.samples**2 / 16)
 
     def _rays_of_sizes(self) -> float:
-        rays, shadows = self.broad_rays + self.narrow_rays, self._shadows()
-        return OPEN_RAY * rays + shadows * (BROAD_RAY * self.broad_rays + NARROW_RAY * self.narrow_rays)
+        broad, narrow = self.broad_traced, self.narrow_traced
+        return OPEN_RAY * (broad + narrow) + self._shadows() * (BROAD_RAY * broad + NARROW_RAY * narrow)
 
     def _shadows(self) -> float:
         """Time of the shadow rays, relative to `MANY_TRIANGLES`; two are the receiver itself."""
@@ -206,8 +233,34 @@ class Workload:
         slab = 1 + (THIN_SLAB - 1) / max(self.thickness, 1.0) if self.ior > 1 else 1.0
         bounced = self.bounced * (SPREAD_BOUNCED + SPREAD_BOUNCED_TEXEL * self.texels)
         if is_wide:
-            return bounced + CHOICE[is_plain] + slab * WIDE[is_plain] * self.texels
+            choice = CHOICE[is_plain] + CHOICE_OF_PLANE * (self.planes - 1)
+            return bounced + choice + slab * WIDE[is_plain] * self.texels
         return bounced + (slab * LAMPS[is_plain] if self.lamps else SUNS) * self.texels
+
+
+def share_of_rays(blocked: float | None) -> float:
+    """Part of all rays that a texel takes after the first pass, of whose light a part is blocked.
+
+    None: no light can arrive. Where all or nothing is blocked, the first rays are enough, about.
+    """
+    if blocked is None or not 0 < blocked < 1:
+        return 0.0
+    if blocked >= 0.5:
+        return 1.0
+    blocked = min(blocked + 1 / RAYS_AROUND, 0.5)
+    return min((BLOCKED_NOISE * (2 * blocked) ** 0.25 / (2 * (1 - blocked))) ** NOISE_POWER, 1.0)
+
+
+def traced_rays(rays: float, share: float) -> float:
+    """Number of rays to a light that a texel traces towards obstacles, the first pass included."""
+    return rays if rays <= MIN_RAYS else MIN_RAYS + share * rays
+
+
+def _share_of(name: str, shares: Shares | None, triangles: int) -> float:
+    """The share of a light; two triangles are the receiver itself."""
+    if triangles <= 2:
+        return 0.0
+    return SOME_BLOCKED if shares is None else shares.get(name, SOME_BLOCKED if shares else 0.0)
 
 
 def channels_of(surface: Surface, lights: Sequence[Light]) -> int:
@@ -222,22 +275,30 @@ def channels_of(surface: Surface, lights: Sequence[Light]) -> int:
 
 
 def workloads_of(
-    grids: Sequence[AnyGrid], lights: Sequence[Light], triangles: int, surface: Surface, settings: BakeSettings, *rest
+    grids: Sequence[AnyGrid],
+    lights: Sequence[Light],
+    triangles: int,
+    surface: Surface,
+    settings: BakeSettings,
+    bounced: bool = False,
+    unknown: float = 0.0,
+    shares: Sequence[Shares | None] = (None, None),
+    has_all_sides: bool = False,
 ) -> list[Workload]:
     """The workload of light on each side of the grids that counts; arguments as of `Workload.of`."""
     sides = [grids, *([backs_of(grids)] if has_back(surface.thickness, settings) else [])]
-    loads = [Workload.of(side, lights, triangles, surface, settings, *rest) for side in sides]
+    rest = triangles, surface, settings, bounced, unknown
+    loads = [Workload.of(side, lights, *rest, there, has_all_sides) for side, there in zip(sides, shares)]
     return [load for load in loads if load.is_lit()] or loads[:1]
 
 
 def _rays(
     grid: AnyGrid, lights: Sequence[Light], surface: Surface, settings: BakeSettings, unknown: float
 ) -> tuple[float, list[tuple[Light, float]]]:
-    """Rays of each texel, and those to each light that reaches the grid; lights share them by irradiance.
+    """Rays of each texel, and those to each light, which reaches the grid; lights share them by irradiance.
 
     `unknown`: as for `Workload.of`.
     """
-    lights = [light for light in lights if not light.is_behind(grid)]
     if settings.layer in WITHOUT_MEDIUM:
         rays = min(RAYS_PER_SAMPLE * settings.samples**2, MAX_RAYS_BY_SAMPLES)
         return _traced(rays), [(light, _traced(rays)) for light in lights]

@@ -21,7 +21,7 @@ from .estimate import (
     workloads_of,
 )
 from .pace import Estimate
-from .spread_light import has_back
+from .spread_light import MIN_RAYS, has_back
 from .steps import Solve, needs_medium, to_simulate
 from .surface import Surface
 from .surroundings import OPEN, Surroundings, bounced_seconds, bounced_seconds_of_cycles
@@ -63,6 +63,8 @@ class Forecast:
     is_bent : True if the receiver is a mesh that bends.
     pieces : into which its texels are divided, on average, if it bends and the grids don't tell; see `Workload`.
     scatters : True if light scatters in a texture's albedos.
+    planes : of the receiver, if the grids don't tell.
+    glowing : number of meshes that glow, if the lights don't tell.
     """
 
     name: str
@@ -75,6 +77,8 @@ class Forecast:
     is_bent: bool = False
     pieces: float = 0.0
     scatters: bool = False
+    planes: int = 0
+    glowing: int = 0
 
     def steps(self, settings: BakeSettings) -> list[Estimate]:
         """Estimates of the steps, without the simulation of media."""
@@ -94,9 +98,13 @@ class Forecast:
             seconds = bounced_seconds(self.triangles, finders.around, nodes, self.is_bent, threads, MAX_RAYS)
             steps.append((BouncedLight.name, seconds))
         unknown = max(self.unknown, OF_WORLD * finders.world)
-        loads = workloads_of(self.grids, self.lights, self.triangles, self.surface, settings, bounced, unknown)
-        known = {"is_bent": self.is_bent, **({"pieces": self.pieces} if self.pieces else {})}
-        seconds = sum(replace(load, **known).seconds(settings) for load in loads)
+        rest = bounced, unknown, [finders.around.shares_on(side) for side in range(2)], self.is_bent
+        loads = workloads_of(self.grids, self.lights, self.triangles, self.surface, settings, *rest)
+        facts = {"pieces": self.pieces, "planes": self.planes}
+        known = {"is_bent": self.is_bent, **{name: value for name, value in facts.items() if value}}
+        # Each light takes a few rays at least.
+        loads = [replace(load, broad_traced=load.broad_traced + MIN_RAYS * self.glowing, **known) for load in loads]
+        seconds = sum(load.seconds(settings) for load in loads)
         if self.scatters and not why_multiplied(settings):
             seconds += textured_seconds(texels, threads, self.is_bent)
         steps.append((Solve.kind_for(settings), seconds))

@@ -6,6 +6,7 @@ import os
 import time
 from abc import ABC, abstractmethod
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 
@@ -24,6 +25,7 @@ from .pace import Estimate
 from .spread import Spread
 from .spread_light import backs_of, has_back
 from .surface import Surface
+from .surroundings import Surroundings, surroundings_of
 from .textured_bake import multiplied_note, why_multiplied
 
 
@@ -74,6 +76,7 @@ class BakeJob:
     name : of the object, for messages.
     texture : result, float32 (height, width, 3) with margin, row 0 at the bottom; None until the last step has run.
     spread : how far light spreads in the texture; None if the result is not luminance.
+    around : surroundings of the receiver, if they are known beforehand.
     """
 
     name: str
@@ -84,6 +87,7 @@ class BakeJob:
     steps: tuple[Step, ...]
     texture: np.ndarray | None = None
     spread: Spread | None = None
+    around: Surroundings | None = None
 
     def run(self, progress: Callback | None = None) -> BakeJob:
         """The job after all its steps. It may have more messages than before."""
@@ -147,7 +151,15 @@ class BakeJob:
         grids, _ = with_edges(self.grids, self.surface, self.name)
         light = self.illumination
         rest = light.triangle_count, self.surface, self.settings, self.finds_light
-        return workloads_of(grids, light.lights, *rest, OF_WORLD * any(step.finds_world for step in self.steps))
+        unknown = OF_WORLD * any(step.finds_world for step in self.steps)
+        shares = [self.surroundings.shares_on(side) for side in range(2)]
+        return workloads_of(grids, light.lights, *rest, unknown, shares)
+
+    @cached_property
+    def surroundings(self) -> Surroundings:
+        """Surroundings of the receiver: those that are known, or by few rays."""
+        has_unknown_sky = any(step.finds_world for step in self.steps)
+        return self.around or surroundings_of(self.grids, self.illumination, has_unknown_sky)
 
     @property
     def memory_limit(self) -> int:

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+import numpy as np
+
 from ..native import native
 from ..scene.bent_grid import AnyGrid
 from ..scene.illumination import Illumination
@@ -26,6 +28,19 @@ def mean_open_irradiance(grid: AnyGrid, lights: Sequence[Light], texels: int = O
 def mean_irradiance(grid: AnyGrid, illumination: Illumination, texels: int = SHADOW_TEXELS) -> float:
     """Mean irradiance with shadows, W/m^2, by so many texels along a side."""
     return _mean_irradiance(grid, illumination, texels, SHADOW_RAYS)
+
+
+def irradiance_map(
+    grid: AnyGrid, illumination: Illumination, light: Light, has_shadows: bool, texels: int
+) -> np.ndarray:
+    """Irradiance (H, W) of one light, the mean of the channels, by so many texels along a side."""
+    coarse = grid.coarse(texels)
+    if light.is_behind(coarse):
+        return np.zeros((coarse.height, coarse.width), np.float32)
+    light = light.coarse(MEAN_WORLD_ROWS) if isinstance(light, WorldLight) else light
+    caster = illumination.caster(grid, light) if has_shadows and light.cast_shadow else None
+    arriving = [(light.at(coarse), light.rgb().tolist(), caster)]
+    return native.bake_arrival(coarse.surface(), arriving, samples=1, rays=SHADOW_RAYS)[0].mean(axis=-1)
 
 
 def _mean_irradiance(grid: AnyGrid, illumination: Illumination, texels: int, rays: int) -> float:

@@ -4,36 +4,40 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
 from ..scene.bent_grid import AnyGrid, BentGrid
 from ..scene.illumination import Illumination
 from ..scene.lights import STRATA, WorldLight
-from .estimate import parallel_seconds
-from .mean_light import mean_irradiance, mean_open_irradiance
+from .estimate import SKY, Shares, parallel_seconds, share_of_rays
+from .mean_light import irradiance_map, mean_irradiance, mean_open_irradiance
 
 # Seconds of one thread until paths begin; and of a ray along a path in the open and, more, in closed rooms: in any
 # case, and for each doubling of the triangles.
-LEARNING, OPEN_RAY, ROOM_RAY = 0.1, (0.36e-6, 0.07e-6), (0.2e-6, 0.035e-6)
+LEARNING, OPEN_RAY, ROOM_RAY = 0.2, (0.36e-6, 0.07e-6), (0.2e-6, 0.035e-6)
 
 # Rays of a path in the open, and more of them in closed rooms.
 OPEN_PATH, ROOM_PATH = 1.0, 1.7
 
 # Paths of each part of the hemisphere at a node that bring the noise of light that is all bounced to one percent, on
 # planes and on surfaces that bend; and the fewest that are traced.
-PATHS, BENT_PATHS, MIN_PATHS = 280.0, 100.0, 2.0
+PATHS, BENT_PATHS, MIN_PATHS = 130.0, 100.0, 1.0
+# Part of even light's square that counts as noise, beside the squares of the differences between directions.
+EVEN_NOISE = 0.2
 
 # The same of paths by Cycles, which nothing guides: on planes, where a filter helps, and on bent surfaces; the fewest
 # and the most; and seconds of one thread for each.
-CYCLES_PATHS, CYCLES_BENT_PATHS, CYCLES_LIMITS, CYCLES_PATH = 500.0, 2000.0, (4.0, 128.0), 4e-6
+CYCLES_PATHS, CYCLES_BENT_PATHS, CYCLES_LIMITS, CYCLES_PATH = 50.0, 200.0, (4.0, 128.0), 4e-6
 
 # Bounced light in a closed room over the light of lamps without obstacles, about.
 BOUNCED_PART = 0.4
 
 # Planes of a receiver that are looked at, and texels along a side of each. More: slower estimates.
 PLANES, TEXELS = 6, 8
+# Texels along a side at which obstacles are looked for, and lights for which they are. More: surer, slower estimates.
+SHARE_TEXELS, MAX_LIGHTS = 24, 8
 
 DIRECTIONS = 128
 """Number of directions that are looked in; more tell the part more finely and take longer."""
@@ -52,17 +56,20 @@ class Surroundings:
     lit : part of the lamps' light that nothing blocks.
     returned : mean and root mean square of bounced light over directions, relative to the mean of all light; None if
         they are not known.
+    shares : `Shares` of the receiver, and of its other face if light there counts.
     """
 
     enclosed: float = 0.0
     lit: float = 1.0
     returned: tuple[float, float] | None = None
+    shares: tuple[Shares, ...] = field(default=(), compare=False)
 
     @property
     def bounced(self) -> float:
         """Part of all light that is bounced, about; more where few directions bring it, whose noise is larger."""
         if self.returned is not None:
-            return self.returned[1]
+            mean, square = self.returned[0] ** 2, self.returned[1] ** 2
+            return math.sqrt(max(square - mean, 0.0) + EVEN_NOISE * mean)
         bounced = BOUNCED_PART * self.enclosed
         return bounced / max(self.lit + bounced, 1e-9)
 
@@ -70,6 +77,12 @@ class Surroundings:
     def bounced_in_cycles(self) -> float:
         """The same for light by Cycles, whose filter removes part of the noise of bright directions."""
         return self.bounced if self.returned is None else math.sqrt(math.prod(self.returned))
+
+    def shares_on(self, side: int) -> Shares | None:
+        """`Shares` of the receiver (0) or of its other face (1); None if they are not known."""
+        if side < len(self.shares):
+            return self.shares[side]
+        return {} if self == OPEN else None
 
 
 OPEN = Surroundings()
@@ -100,12 +113,26 @@ def surroundings_of(
 ) -> Surroundings:
     """The surroundings of a receiver, by few rays; `has_unknown_sky`: True if light of a sky is still to be found."""
     grids = sorted(grids, key=lambda grid: -grid.texels)[:PLANES]
+    shares = _shares(grids[0], illumination)
     sky = illumination.with_lights([_sky()])
     open_sky = [mean_open_irradiance(grid, sky.lights, TEXELS) for grid in grids]
     open_light = [mean_open_irradiance(grid, illumination.lights, TEXELS) for grid in grids]
     seen = sum(mean_irradiance(grid, sky, TEXELS) for grid in grids) / (sum(open_sky) or 1.0)
     lit = sum(mean_irradiance(grid, illumination, TEXELS) for grid in grids) / (sum(open_light) or 1.0)
-    return Surroundings(min(max(1.0 - seen, 0.0), 1.0), min(max(lit, seen * has_unknown_sky), 1.0))
+    return Surroundings(min(max(1.0 - seen, 0.0), 1.0), min(max(lit, seen * has_unknown_sky), 1.0), shares=(shares,))
+
+
+def _shares(grid: AnyGrid, illumination: Illumination) -> Shares:
+    """`Shares` of the brightest lights with a size, and of an even sky."""
+    lights = sorted((light for light in illumination.lights if light.has_size), key=lambda light: -light.strength)
+    shares = {}
+    for name, light in [(SKY, _sky()), *((light.name, light) for light in lights[:MAX_LIGHTS])]:
+        shown, arriving = (
+            irradiance_map(grid, illumination, light, has_shadows, SHARE_TEXELS) for has_shadows in (0, 1)
+        )
+        parts = np.where(shown > 0, 1 - arriving / np.where(shown > 0, shown, 1.0), np.nan)
+        shares[name] = float(np.mean([share_of_rays(None if np.isnan(part) else part) for part in parts.ravel()]))
+    return shares
 
 
 def _sky() -> WorldLight:

@@ -12,7 +12,6 @@ import bpy
 import numpy as np
 
 from ....core.bake.bake_settings import COMBINED, BakeSettings
-from ....core.bake.bounced import BouncedLight
 from ....core.bake.finish import with_seams
 from ....core.bake.forecast import Finders, Forecast
 from ....core.bake.job import BakeJob
@@ -133,9 +132,7 @@ class BakePlan:
                 self.target.object_name, receiver, illumination, self.surface_with_color(), settings, BAKE_STEPS
             )
             job = self._with_color(self.by_cycles.complete(job))
-            around = self._announced_around()
-            known = [replace(step, around=around) if isinstance(step, BouncedLight) else step for step in job.steps]
-            job = replace(job, steps=tuple(known))
+            job = replace(job, around=self._announced_around())
             if settings.layer == COMBINED:
                 job = replace(job, spread=Spread.of(length_of(self.mesh), job.surface, mean_size(self.mesh, self.size)))
             job.check_memory()

@@ -72,7 +72,7 @@ so that a cancelled animation goes on where it was"""
 
 
 class BEAMSPREAD_OT_bake_files(FilesOperator, bpy.types.Operator):
-    """Bake the present frame into files of the folder, one for each object and material. The nodes' images stay"""
+    """Bake the current frame into files of the folder, one for each object and material. The nodes' images stay"""
 
     bl_idname = "beamspread.bake_files"
     bl_label = "Bake to Files"
