@@ -42,6 +42,26 @@ constexpr Numbers make_direction_numbers()
 
 constexpr Numbers direction_numbers = make_direction_numbers();
 
+// Points whose index has one byte that is not 0, with the lowest bit as the first digit: the points are linear over GF(2).
+using BytePoints = std::array<std::array<std::array<std::uint32_t, GridSobol::dimensions>, 256>, 4>;
+
+BytePoints make_byte_points()
+{
+    BytePoints points{};
+    for (std::size_t byte = 0; byte < points.size(); ++byte)
+        for (std::size_t value = 0; value < points[byte].size(); ++value)
+            for (std::size_t d = 0; d < GridSobol::dimensions; ++d) {
+                std::uint32_t digits = 0;
+                for (std::size_t bit = 0; bit < 8; ++bit)
+                    if (value >> bit & 1u)
+                        digits ^= direction_numbers[d][8 * byte + bit];
+                points[byte][value][d] = reverse_bits(digits);
+            }
+    return points;
+}
+
+const BytePoints byte_points = make_byte_points();
+
 std::uint64_t spread_bits(std::uint64_t value)
 {
     value = (value | value << 16) & 0x0000ffff0000ffffULL;
@@ -111,12 +131,9 @@ std::uint32_t GridSobol::shuffle(std::uint32_t cell, std::uint32_t seed) const
 GridSobol::Bits GridSobol::sequence(std::uint32_t index)
 {
     Bits point{};
-    for (std::size_t bit = 0; index != 0; ++bit, index >>= 1) {
-        if (index & 1u)
-            for (std::size_t d = 0; d < dimensions; ++d)
-                point[d] ^= direction_numbers[d][bit];
-    }
-    std::ranges::transform(point, point.begin(), reverse_bits);
+    for (std::size_t byte = 0; byte < byte_points.size(); ++byte)
+        for (std::size_t d = 0; d < dimensions; ++d)
+            point[d] ^= byte_points[byte][index >> 8 * byte & 255u][d];
     return point;
 }
 

@@ -395,8 +395,8 @@ even_rays : int
 samples : int
     For a light without a size, samples x samples points in each texel, each with its own visibility; 1 to 64.
 find_shadows : bool
-    False: for a light without a size, rays are traced from every texel, also where none can be blocked or one triangle
-    blocks them all. The result is the same; for measurements.
+    False: rays are traced from every texel, also where none can be blocked, or where one triangle blocks all those to
+    a light without a size. The result is the same; for measurements.
 
 Returns
 -------

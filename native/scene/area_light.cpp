@@ -232,6 +232,14 @@ Vec3 AreaLight::irradiance(const Vec3& point, const Vec3& normal) const
     return Vec3(m_radiance * seen(point, normal, to_plane));
 }
 
+std::vector<LightSource> AreaLight::corners() const
+{
+    std::vector<LightSource> corners;
+    for (const Vec2& place : rectangle)
+        corners.push_back({.position = m_position + place.x * m_side_x + place.y * m_side_y});
+    return corners;
+}
+
 double AreaLight::distance_from(const Vec3& point) const
 {
     return glm::distance(point, m_position) - 0.5 * (glm::length(m_side_x) + glm::length(m_side_y));

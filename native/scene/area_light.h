@@ -20,6 +20,7 @@ public:
                 LightRay* rays) const override;
     Vec3 irradiance(const Vec3& point, const Vec3& normal) const override;
     double distance_from(const Vec3& point) const override;
+    std::vector<LightSource> corners() const override;
 
 private:
     // The part of the lamp that rays are sent to, in coordinates along its sides, each from -0.5 to 0.5.

@@ -9,6 +9,7 @@
 #include <memory>
 #include <optional>
 #include <span>
+#include <vector>
 
 #include "base/vec.h"
 
@@ -30,6 +31,9 @@ struct LightSource {
     // True if only the distance and the cosine make irradiance change from point to point.
     bool is_smooth = false;
 };
+
+// The corners of a box along the axes of the world.
+std::vector<LightSource> box_corners(const Vec3& low, const Vec3& high);
 
 class DistantLight;
 
@@ -54,6 +58,10 @@ public:
     // A lower bound of the distance to the light, metres. Irradiance hardly changes within a small part of it; infinite:
     // irradiance is the same at all points.
     virtual double distance_from(const Vec3& /*point*/) const { return std::numeric_limits<double>::infinity(); }
+
+    // Corners of a convex body that holds all points of the light, or directions between which all of it lies; none if the
+    // light comes from all around.
+    virtual std::vector<LightSource> corners() const { return {}; }
 
     // True if rays of the light differ in color; otherwise all channels of a ray's flux are equal.
     virtual bool is_colored() const { return false; }

@@ -18,6 +18,7 @@ public:
                 LightRay* rays) const override;
     Vec3 irradiance(const Vec3& point, const Vec3& normal) const override;
     double distance_from(const Vec3& point) const override;
+    std::vector<LightSource> corners() const override { return box_corners(m_low, m_high); }
     bool is_colored() const override { return m_is_colored; }
     // A copy whose near faces are sampled by solid angle, so that rays from points beside them have bounded flux.
     std::shared_ptr<const Light> facing_all() const override;

@@ -22,6 +22,11 @@ std::optional<LightSource> PointLight::source() const
     return LightSource{.position = m_position, .is_smooth = true};
 }
 
+std::vector<LightSource> PointLight::corners() const
+{
+    return box_corners(m_position - m_radius, m_position + m_radius);
+}
+
 bool PointLight::is_inside(const Vec3& point) const
 {
     const Vec3 way = m_position - point;

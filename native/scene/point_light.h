@@ -29,6 +29,8 @@ public:
     double distance_from(const Vec3& point) const override { return glm::distance(point, m_position) - m_radius; }
     std::optional<LightSource> source() const override;
 
+    std::vector<LightSource> corners() const override;
+
     const Vec3& position() const { return m_position; }
 
     // True if the point lies in the ball.

@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <array>
 #include <bit>
-#include <numeric>
 #include <optional>
 #include <string>
 #include <vector>
@@ -14,6 +13,8 @@
 #include "scene/checks.h"
 #include "scene/first_pass.h"
 #include "scene/open_irradiance.h"
+#include "scene/open_tiles.h"
+#include "scene/ray_order.h"
 #include "scene/shadow_ray.h"
 
 namespace beamspread {
@@ -23,10 +24,6 @@ namespace {
 // Texels of a row, and rays of each, that are gathered at once. More need more of the processor's cache: 400 kB here.
 constexpr std::size_t texels_at_once = 64;
 constexpr std::size_t max_rays_at_once = 256;
-
-// Parts along a side of a light by which the rays of a texel are sorted. More: rays of a packet meet more of the same
-// triangles, and sorting takes longer.
-constexpr std::size_t light_parts = 8;
 
 // Number of times that the rays of a texel are moved on if none finds the light. More find narrower lights.
 constexpr int max_trials = 64;
@@ -46,14 +43,18 @@ public:
           m_open(grid, m_light),
           m_occluders(occluders),
           m_with_travel(settings.with_travel),
+          m_is_coherent(!m_light.corners().empty()),
           m_ray_count(std::bit_floor(static_cast<std::size_t>(settings.rays))),
           m_even_rays(std::bit_floor(std::min(static_cast<std::size_t>(settings.even_rays), m_ray_count))),
           m_sobol(m_ray_count, settings.seed),
           m_even_sobol(std::max<std::size_t>(m_even_rays, 1), settings.seed),
           m_rays(grid, occluders, settings.clearance)
     {
-        if (occluders && m_even_rays > 0 && m_even_rays < m_ray_count)
+        if (occluders && m_even_rays > 0 && m_even_rays < m_ray_count) {
             m_first_pass.emplace(grid.width, grid.height, m_even_rays, m_ray_count, settings.seed);
+            if (settings.find_shadows)
+                m_open_tiles.emplace(grid, m_light, *occluders, m_rays.start(), FirstPass::tile_side);
+        }
         if (settings.noise)
             m_noise.resize(grid.height);
     }
@@ -130,8 +131,7 @@ private:
         std::vector<double> densities;
         std::vector<Vec3> points, weights;
         std::vector<LightRay> rays;
-        std::vector<std::uint8_t> parts;   // of the light
-        std::vector<std::uint16_t> order;  // in which rays are traced
+        RayOrder order;  // in which rays are traced
 
         void start(std::size_t count, const Span& new_span)
         {
@@ -150,8 +150,6 @@ private:
             points.resize(count);
             weights.resize(count);
             rays.resize(count);
-            parts.resize(count);
-            order.resize(count);
         }
     };
 
@@ -193,11 +191,22 @@ private:
             work.met.assign(span.width, Met::nothing);
             work.first.assign(span.width, {});
             for (std::size_t i = 0; i < span.width; ++i)
-                gather_texel(i, {&m_even_sobol, 0, m_even_rays, m_even_rays, true}, work);
+                if (m_open_tiles && m_open_tiles->is_open(span.x + i, y))
+                    note_open(i, work);
+                else
+                    gather_texel(i, {&m_even_sobol, 0, m_even_rays, m_even_rays, true}, work);
             trace(work);
             for (std::size_t i = 0; i < span.width; i += FirstPass::tile_side)
                 note(i, std::min(FirstPass::tile_side, span.width - i), work);
         }
+    }
+
+    // Notes a texel of a span whose rays nothing can block.
+    void note_open(std::size_t texel, Work& work)
+    {
+        const float open = mean(Vec3f(m_open.at(work.span.x + texel, work.span.y)));
+        work.met[texel] = open > 0.0f ? Met::light : Met::nothing;
+        work.first[texel] = {.open = open, .irradiance = open};
     }
 
     // Notes the first rays of texels [first, first + count) of a span, which lie in one tile.
@@ -316,7 +325,7 @@ private:
             for (std::size_t i = 0; i < count; ++i)
                 work.weights[i] /= work.densities[i];
         if (part.is_traced)
-            sort(work);
+            work.order.sort(work.on_light);
         for (std::size_t k = 0; k < count; ++k) {
             const std::size_t i = part.is_traced ? work.order[k] : k;
             if (work.weights[i] == Vec3(0.0))
@@ -341,31 +350,6 @@ private:
             if (++work.waiting == Occluders::packet_size)
                 trace(work);
         }
-    }
-
-    // Orders the rays of a texel so that those to the same part of the light are traced together: they meet the same
-    // triangles.
-    static void sort(Work& work)
-    {
-        constexpr std::array<std::uint8_t, light_parts> spread = {0, 1, 4, 5, 16, 17, 20, 21};  // of a Morton curve
-        const auto index = [](double place) {
-            return std::min(static_cast<std::size_t>(place * static_cast<double>(light_parts)), light_parts - 1);
-        };
-        const std::size_t count = work.rays.size();
-        if (count < 2 * Occluders::packet_size) {
-            std::iota(work.order.begin(), work.order.end(), std::uint16_t{0});
-            return;
-        }
-        std::array<std::uint16_t, light_parts * light_parts + 1> ends{};
-        for (std::size_t i = 0; i < count; ++i) {
-            const Vec2& place = work.on_light[i];
-            work.parts[i] = static_cast<std::uint8_t>(spread[index(place.x)] + 2 * spread[index(place.y)]);
-            ++ends[work.parts[i] + 1u];
-        }
-        for (std::size_t i = 1; i < ends.size(); ++i)
-            ends[i] = static_cast<std::uint16_t>(ends[i] + ends[i - 1]);
-        for (std::size_t i = 0; i < count; ++i)
-            work.order[ends[work.parts[i]]++] = static_cast<std::uint16_t>(i);
     }
 
     // Finds the rays of a texel at their places and the irradiance that each brings unblocked; returns the sum.
@@ -416,8 +400,7 @@ private:
     {
         std::array<Vec3f, Occluders::packet_size> transmittance;
         if (work.waiting > 0)
-            // Rays of a texel to the sky diverge: tracing them as coherent takes half as long again.
-            m_occluders->transmit(std::span(work.packet).first(work.waiting), transmittance.data(), false);
+            m_occluders->transmit(std::span(work.packet).first(work.waiting), transmittance.data(), m_is_coherent);
         for (std::size_t i = 0; i < work.waiting; ++i) {
             const std::size_t index = work.carried[i];
             const Vec3f open = work.irradiance[index];
@@ -449,12 +432,15 @@ private:
     OpenIrradiance m_open;
     const Occluders* m_occluders;
     bool m_with_travel;
+    // False for rays of a texel to the sky, which diverge: tracing them as coherent takes half as long again.
+    bool m_is_coherent;
     std::size_t m_ray_count;
     std::size_t m_even_rays;
     GridSobol m_sobol;
     GridSobol m_even_sobol;
     ReceiverRays m_rays;
     std::optional<FirstPass> m_first_pass;
+    std::optional<OpenTiles> m_open_tiles;
     std::vector<RayNoise> m_noise;  // [row] sums over its texels; empty unless noise is asked for
     PerThread<Work> m_work;
 };

@@ -64,7 +64,7 @@ struct RaySettings {
     double clearance = 0.0;
     int threads = 0;  // 0: all
     bool with_travel = true;
-    // False traces rays from every texel; the result is the same.
+    // False traces rays from every texel, also where none can be blocked; the result is the same.
     bool find_shadows = true;
     // Takes the noise of the light besides; may be null.
     RayNoise* noise = nullptr;

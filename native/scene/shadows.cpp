@@ -1,159 +1,18 @@
 #include "scene/shadows.h"
 
 #include <algorithm>
-#include <array>
 #include <bit>
 #include <cmath>
-#include <cstdlib>
-#include <limits>
+
+#include "scene/facets.h"
+#include "scene/projection.h"
 
 namespace beamspread {
 
 namespace {
 
-constexpr double infinity = std::numeric_limits<double>::infinity();
-
-// Height of the lamp above a vertex, relative to its height above the plane, below which the vertex counts as a shadow
-// without an end: the shadow lies a million heights away, where irradiance is 1e-18 of the largest.
-constexpr double min_relative_weight = 1e-6;
-
-// Bound of the rounding of the computation here, texels: far above 65536 * 2^-53 = 7e-12, double precision at the largest
-// texture's side.
-constexpr double own_rounding = 1e-6;
-
 // Number of facets above which tracing all rays of a million texels is faster than finding the shadows.
 constexpr std::size_t max_facets = std::size_t{1} << 21;
-
-// Sides of a box as triangles of Hull's corners.
-constexpr std::array<std::array<unsigned, 3>, 12> box_facets = {{{0, 1, 3},
-                                                                 {0, 3, 2},
-                                                                 {4, 6, 7},
-                                                                 {4, 7, 5},
-                                                                 {0, 4, 5},
-                                                                 {0, 5, 1},
-                                                                 {2, 3, 7},
-                                                                 {2, 7, 6},
-                                                                 {0, 2, 6},
-                                                                 {0, 6, 4},
-                                                                 {1, 5, 7},
-                                                                 {1, 7, 3}}};
-
-struct Interval {
-    double low = infinity;
-    double high = -infinity;
-
-    void extend(double x)
-    {
-        low = std::min(low, x);
-        high = std::max(high, x);
-    }
-};
-
-// A triangle's shadow in texels.
-struct Shadow {
-    std::array<Vec2, 3> corners;
-    Vec2 reach{};           // largest move by rounding
-    bool is_whole = false;  // true if an opaque triangle lies wholly between the starts and the ends of rays
-
-    Interval rows() const
-    {
-        Interval rows;
-        for (const Vec2& corner : corners)
-            rows.extend(corner.y);
-        return {rows.low - reach.y, rows.high + reach.y};
-    }
-
-    // The part of a horizontal line inside the shadow; may be empty.
-    Interval cut(double y) const
-    {
-        Interval cut;
-        for (std::size_t i = 0; i < 3; ++i) {
-            const Vec2& a = corners[i];
-            const Vec2& b = corners[(i + 1) % 3];
-            if ((a.y <= y) != (b.y <= y))
-                cut.extend(a.x + (y - a.y) / (b.y - a.y) * (b.x - a.x));
-        }
-        return cut;
-    }
-};
-
-// Central projection from the light onto the plane.
-class Projection {
-public:
-    Projection(const ReceiverGrid& grid, const LightSource& source, const RayStart& start)
-        : m_grid(grid),
-          m_source(source.position - (source.is_far ? Vec3(0.0) : grid.origin)),
-          m_is_near(source.is_far ? 0.0 : 1.0),
-          m_source_height(glm::dot(m_source, grid.normal)),
-          m_start(start)
-    {
-    }
-
-    bool is_lit() const { return m_source_height > 0.0; }
-
-    struct Heights {
-        std::array<double, 3> corners;
-        double lowest;
-        double highest;
-        double rounding;  // bound of the rounding of a ray and of the triangle
-    };
-
-    Heights heights(const std::array<Vec3, 3>& triangle, double rounding) const
-    {
-        const auto height = [this](const Vec3& corner) { return glm::dot(corner - m_grid.origin, m_grid.normal); };
-        const std::array<double, 3> all = {height(triangle[0]), height(triangle[1]), height(triangle[2])};
-        const auto [lowest, highest] = std::minmax({all[0], all[1], all[2]});
-        return {all, lowest, highest, std::max(m_start.rounding, rounding)};
-    }
-
-    // True if the triangle lies below the starts of rays, or beyond the lamp.
-    bool is_off_the_way(const Heights& heights) const
-    {
-        const double lowest_start = m_start.clearance + 0.5 * m_start.rounding;
-        return heights.highest + (heights.rounding - m_start.rounding) <= lowest_start ||
-               (m_is_near > 0.0 && heights.lowest >= m_source_height + heights.rounding);
-    }
-
-    // True if the shadow has an end, not too far away.
-    bool has_shadow(const Heights& heights) const
-    {
-        return m_source_height > 2.0 * m_start.height() &&
-               weight(heights.highest) > min_relative_weight * m_source_height;
-    }
-
-    Shadow shadow(const std::array<Vec3, 3>& triangle, bool is_opaque, const Heights& heights) const
-    {
-        Shadow shadow{};
-        for (std::size_t i = 0; i < 3; ++i)
-            project(triangle[i], heights.corners[i], heights.rounding, shadow.corners[i], shadow.reach);
-        const double margin = m_start.height() + heights.rounding;
-        shadow.is_whole =
-            is_opaque && heights.lowest >= margin && (m_is_near == 0.0 || heights.highest <= m_source_height - margin);
-        return shadow;
-    }
-
-private:
-    void project(const Vec3& vertex, double height, double rounding, Vec2& corner, Vec2& reach) const
-    {
-        // With heights h above the plane: p = (h_s v - h_v s) / (h_s - h_v) for a lamp at s, and for a sun in the
-        // direction s p = v - (h_v / h_s) s.
-        const Vec3 point = (m_source_height * (vertex - m_grid.origin) - height * m_source) / weight(height);
-        corner = {glm::dot(point, m_grid.x_axis) / m_grid.pitch_x, glm::dot(point, m_grid.y_axis) / m_grid.pitch_y};
-        // A step of 1 at the vertex or at the ray's start moves the shadow by up to this factor: 1 / cos for a sun,
-        // larger for a lamp.
-        const double magnification = glm::length(m_source - m_is_near * point) / weight(height);
-        const double step = 2.0 * (m_start.clearance + rounding) * magnification;
-        reach = glm::max(reach, Vec2(step / m_grid.pitch_x, step / m_grid.pitch_y) + own_rounding);
-    }
-
-    double weight(double height) const { return m_source_height - m_is_near * height; }
-
-    const ReceiverGrid& m_grid;
-    Vec3 m_source;  // from the grid's origin to a lamp; the unit vector towards a sun
-    double m_is_near;
-    double m_source_height;
-    RayStart m_start;
-};
 
 // The nearest whole number of texels from 0 to `count`.
 std::size_t clamped(double texel, std::size_t count)
@@ -201,14 +60,14 @@ Shadows::Shadows(const ReceiverGrid& grid, const LightSource& source, const Occl
     const Projection projection(grid, source, start);
     if (!projection.is_lit())
         return;
-    if (facet_count() > max_facets) {
+    if (facet_count(*occluders) > max_facets) {
         m_is_unknown = true;
         return;
     }
     m_leaves = std::bit_ceil(bands());
     m_nodes.resize(2 * m_leaves);
-    for (std::size_t i = 0; i < facet_count(); ++i) {
-        const Facet item = facet(i);
+    for (std::size_t i = 0; i < facet_count(*occluders); ++i) {
+        const Facet item = facet(*m_occluders, i);
         const Projection::Heights heights = projection.heights(item.corners, item.rounding);
         if (projection.is_off_the_way(heights) && !(item.is_opaque && is_contact(grid, *occluders, i, start)))
             continue;
@@ -232,23 +91,6 @@ Shadows::Shadows(const ReceiverGrid& grid, const LightSource& source, const Occl
     }
 }
 
-std::size_t Shadows::facet_count() const
-{
-    return m_occluders->own_count() + box_facets.size() * m_occluders->hulls().size();
-}
-
-Shadows::Facet Shadows::facet(std::size_t index) const
-{
-    if (index < m_occluders->own_count()) {
-        const std::array<Vec3, 3> corners = m_occluders->triangle(index);
-        return {corners, rounding_of(corners, m_occluders->origin()), index < m_occluders->own_opaque_count()};
-    }
-    const auto [hull, side] = std::lldiv(static_cast<long long>(index - m_occluders->own_count()), box_facets.size());
-    const Hull& box = m_occluders->hulls()[static_cast<std::size_t>(hull)];
-    const auto [a, b, c] = box_facets[static_cast<std::size_t>(side)];
-    return {{box.corner(a), box.corner(b), box.corner(c)}, rounding_of(box), false};
-}
-
 void Shadows::shade_band(std::size_t band, std::vector<Shade>& texels) const
 {
     const std::size_t begin = band * rows_per_band;
@@ -259,7 +101,7 @@ void Shadows::shade_band(std::size_t band, std::vector<Shade>& texels) const
     const Projection projection(m_grid, m_source, m_start);
     for (std::size_t node = m_leaves + band; node > 0; node /= 2) {
         for (const std::uint32_t i : m_nodes[node]) {
-            const Facet item = facet(i);
+            const Facet item = facet(*m_occluders, i);
             const Projection::Heights heights = projection.heights(item.corners, item.rounding);
             const Shadow shadow = projection.shadow(item.corners, item.is_opaque, heights);
             const Interval rows = shadow.rows();

@@ -6,7 +6,6 @@
 // (tests/bench/gather.py).
 #pragma once
 
-#include <array>
 #include <cstdint>
 #include <vector>
 
@@ -40,16 +39,6 @@ public:
     void shade_band(std::size_t band, std::vector<Shade>& texels) const;
 
 private:
-    // A triangle of its own, or a triangle of the box around an instance.
-    struct Facet {
-        std::array<Vec3, 3> corners;
-        double rounding;
-        bool is_opaque;  // false: light may pass it
-    };
-
-    Facet facet(std::size_t index) const;
-    std::size_t facet_count() const;
-
     const ReceiverGrid& m_grid;
     LightSource m_source;
     const Occluders* m_occluders;

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "base/circle.h"
 #include "base/constants.h"
 
 namespace beamspread {
@@ -36,15 +37,13 @@ Vec3 Cone::direction(const Vec2& place, double& along) const
     const double one_minus_cos = place.x * m_one_minus_cos;
     along = 1.0 - one_minus_cos;
     const double across = std::sqrt(one_minus_cos * (1.0 + along));
-    const double phi = 2.0 * pi * place.y;
-    return m_frame.to_world({across * std::cos(phi), across * std::sin(phi), along});
+    return m_frame.to_world(Vec3(across * on_circle(place.y), along));
 }
 
 Vec3 Cone::tangent(const Vec2& place, double radius_squared) const
 {
     const double across = std::sqrt(place.x * radius_squared);
-    const double phi = 2.0 * pi * place.y;
-    return glm::normalize(m_frame.to_world({across * std::cos(phi), across * std::sin(phi), 1.0}));
+    return glm::normalize(m_frame.to_world(Vec3(across * on_circle(place.y), 1.0)));
 }
 
 // Snyder 1996, "Area light sources for real-time graphics", MSR-TR-96-11: a cone that the horizon cuts.
@@ -68,9 +67,7 @@ double Cone::irradiance(const Vec3& normal) const
 
 Vec3 cosine_hemisphere(const Vec2& place)
 {
-    const double radius = std::sqrt(place.x);
-    const double phi = 2.0 * pi * place.y;
-    return {radius * std::cos(phi), radius * std::sin(phi), std::sqrt(1.0 - place.x)};
+    return {std::sqrt(place.x) * on_circle(place.y), std::sqrt(1.0 - place.x)};
 }
 
 double polygon_irradiance(std::span<const Vec3> corners, const Vec3& normal)

@@ -49,6 +49,7 @@ public:
     Vec3 irradiance(const Vec3& point, const Vec3& normal) const override;
     double distance_from(const Vec3& point) const override { return m_ball.distance_from(point); }
     std::optional<LightSource> source() const override;
+    std::vector<LightSource> corners() const override { return m_ball.corners(); }
 
 private:
     // Unit vector from the center to a point; 0 at the center.

@@ -74,6 +74,7 @@ public:
     }
 
     std::optional<LightSource> source() const override { return m_sun.source(); }
+    std::vector<LightSource> corners() const override { return m_sun.corners(); }
 
 private:
     const SunLight& m_sun;
@@ -99,6 +100,20 @@ std::optional<LightSource> SunLight::source() const
     if (m_angle > max_parallel_angle)
         return std::nullopt;
     return LightSource{.position = -m_travel, .is_far = true};
+}
+
+std::vector<LightSource> SunLight::corners() const
+{
+    // Beside a disk of half the angle 45 degrees a pyramid becomes wide.
+    if (m_sin_squared > 0.5)
+        return {};
+    const double tangent = std::sqrt(m_sin_squared / (1.0 - m_sin_squared));
+    const Frame frame(-m_travel);
+    std::vector<LightSource> corners;
+    for (const double x : {-tangent, tangent})
+        for (const double y : {-tangent, tangent})
+            corners.push_back({.position = frame.to_world({x, y, 1.0}), .is_far = true});
+    return corners;
 }
 
 LightRay SunLight::ray(const Vec2& place) const

@@ -32,6 +32,7 @@ public:
                 LightRay* rays) const override;
     Vec3 irradiance(const Vec3& point, const Vec3& normal) const override;
     std::optional<LightSource> source() const override;
+    std::vector<LightSource> corners() const override;
     // A flat disk with a table of its irradiance; this light must outlive it.
     std::shared_ptr<const Light> facing_all() const override;
 

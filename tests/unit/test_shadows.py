@@ -87,6 +87,49 @@ def test_texels_that_need_no_rays_are_as_if_traced(
         np.testing.assert_array_equal(searched[1], traced[1])
 
 
+def sized_light(kind, slant, height, axes, centre):
+    """A light whose rays reach the receiver from within a small part of the sky."""
+    place = np.array([0.1 * slant, 0.2, height]) @ axes + centre
+    if kind == "sun":
+        return native.SunLight(np.array([-slant, -0.3, -1.0]) @ axes, 0.1)
+    if kind == "ball":
+        return native.PointLight(place, 0.1)
+    if kind == "area":
+        return native.AreaLight(place, axes, 0.3, 0.1)
+    return native.MeshLight(0.1 * SQUARE @ axes + place, FACES, np.ones((len(FACES), 3), np.float32))
+
+
+@pytest.mark.parametrize("light", ["sun", "ball", "area", "mesh"])
+@pytest.mark.parametrize("kind", ["opaque", "see-through", "instances"])
+@settings(max_examples=12, deadline=None)
+@given(
+    seed=SEEDS,
+    count=st.integers(1, 6),
+    slant=st.sampled_from([-1.0, 0.0, 1.0, 10.0]),
+    lamp_height=st.sampled_from([0.3, 1.0, 5.0]),
+    clearance=st.sampled_from([0.0, 0.05]),
+    far=st.sampled_from([0, 1e4]),
+)
+def test_tiles_that_no_light_of_a_size_shades_are_as_if_traced(
+    light, kind, seed, count, slant, lamp_height, clearance, far
+):
+    """Bit by bit, and for any number of threads."""
+    axes, centre, rng = rotation(seed), far * np.array([30.0, -20.0, 10.0]), np.random.default_rng(seed)
+    grid = native.ReceiverGrid(**make_grid(150, 110, (2.0, 1.5), axes, centre))
+    mesh = random_mesh(rng, kind, count, 0.1, slant, axes, centre)
+    casters = native.Occluders([mesh], centre, max_copied=0)
+    lamp = sized_light(light, slant, lamp_height, axes, centre)
+    assert gather_beams(grid, lamp, None)[0].max() > 0
+    options = {"rays": 32, "even_rays": 4, "clearance": clearance}
+    traced, *others = (
+        gather_beams(grid, lamp, casters, find_shadows=find, threads=threads, **options)
+        for find, threads in ((False, 0), (True, 1), (True, 3))
+    )
+    for searched in others:
+        np.testing.assert_array_equal(searched[0], traced[0])
+        np.testing.assert_array_equal(searched[1], traced[1])
+
+
 @MANY
 @given(
     seed=SEEDS,

@@ -1,0 +1,11 @@
+// Points of the unit circle, several times as fast as the C library's sine and cosine.
+#pragma once
+
+#include "base/vec.h"
+
+namespace beamspread {
+
+// (cos, sin) of 2 pi `turn`, 0 <= turn <= 1; right to 1e-10.
+Vec2 on_circle(double turn);
+
+}  // namespace beamspread
