@@ -1,5 +1,6 @@
 #include "base/circle.h"
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 
@@ -9,29 +10,29 @@ namespace beamspread {
 
 namespace {
 
-// Nodes around the circle. The angle d to the next one is at most pi / nodes = .006, so that the first left-out term of the
+// Nodes around the circle. The angle d to the nearest one is at most pi / nodes = .006, so that the first left-out term of the
 // cosine, d^4 / 24, is 6e-11. More nodes take more of the processor's cache.
 constexpr std::size_t nodes = 512;
 
-std::array<Vec2, nodes + 1> make_nodes()
+std::array<Vec2, nodes> make_nodes() noexcept
 {
-    std::array<Vec2, nodes + 1> circle;
+    std::array<Vec2, nodes> circle;
     for (std::size_t i = 0; i < circle.size(); ++i) {
-        const double angle = 2.0 * pi * static_cast<double>(i) / static_cast<double>(nodes);
+        const double angle = 2.0 * pi * (static_cast<double>(i) + 0.5) / static_cast<double>(nodes);
         circle[i] = {std::cos(angle), std::sin(angle)};
     }
     return circle;
 }
 
-const std::array<Vec2, nodes + 1> circle = make_nodes();
+const std::array<Vec2, nodes> circle = make_nodes();
 
 }  // namespace
 
 Vec2 on_circle(double turn)
 {
     const double at = turn * static_cast<double>(nodes);
-    const auto node = static_cast<std::size_t>(at + 0.5);
-    const double rest = (at - static_cast<double>(node)) * (2.0 * pi / static_cast<double>(nodes));
+    const std::size_t node = std::min(static_cast<std::size_t>(at), nodes - 1);
+    const double rest = (at - static_cast<double>(node) - 0.5) * (2.0 * pi / static_cast<double>(nodes));
     const double squared = rest * rest;
     const double cosine = 1.0 - 0.5 * squared;
     const double sine = rest * (1.0 - squared / 6.0);

@@ -45,7 +45,7 @@ constexpr Numbers direction_numbers = make_direction_numbers();
 // Points whose index has one byte that is not 0, with the lowest bit as the first digit: the points are linear over GF(2).
 using BytePoints = std::array<std::array<std::array<std::uint32_t, GridSobol::dimensions>, 256>, 4>;
 
-BytePoints make_byte_points()
+BytePoints make_byte_points() noexcept
 {
     BytePoints points{};
     for (std::size_t byte = 0; byte < points.size(); ++byte)
