@@ -202,11 +202,13 @@ std::vector<double> solve_adaptive(const Plane& plane, const PlaneLight& light, 
     const double distance = std::hypot(static_cast<double>(height) * pitch_y, static_cast<double>(width) * pitch_x);
     const double near = near_radius(by_angle(plane, light, medium), std::max(pitch_y, pitch_x), distance,
                                     2.0 * tolerance_share * tolerance, progress);
-    const double tried =
-        tried_radius(terms, light, squares, wide, pitch_y, pitch_x, near, tolerance_share * tolerance, progress);
-    TermSums texel_sums(terms, grid_levels(height, width, pitch_y, pitch_x, tried));
+    std::vector<KernelIntegrals> integrals = kernel_integrals(terms);
+    const double tried = tried_radius(terms, integrals, light, squares, wide, pitch_y, pitch_x, near,
+                                      tolerance_share * tolerance, progress);
+    TermSums texel_sums(terms, integrals, grid_levels(height, width, pitch_y, pitch_x, tried));
     // The kernel of wide beams is the light that one texel spreads to all offsets, on the same levels.
-    TermSums kernel_sums(terms, grid_levels(2 * height - 1, 2 * width - 1, pitch_y, pitch_x, near));
+    TermSums kernel_sums(terms, integrals, grid_levels(2 * height - 1, 2 * width - 1, pitch_y, pitch_x, near),
+                         LitTexels::middle);
 
     Grid sum(height, width);
     for (std::size_t t = 0; t < count; ++t) {

@@ -34,6 +34,8 @@ Grid take_steps(Grid& light, const std::vector<Square>& squares);
 // (summed-area table: Crow 1984, doi:10.1145/800031.808600).
 KernelTable step_kernel(const Grid& kernel);
 
+class KernelIntegrals;
+
 // Beams of about the same angle.
 struct AngleLight {
     RadialProfile profile;
@@ -52,9 +54,9 @@ double near_radius(const std::vector<AngleLight>& lights, double pitch, double d
 // Errors at other texels may be larger (docs/tuning.md, "`trial_radii`").
 //
 // `squares` are those of the light, without the `wide` ones. Lengths are in mean free paths.
-double tried_radius(const LightTerms& terms, const PlaneLight& light, const std::vector<Square>& squares,
-                    const std::vector<Square>& wide, double pitch_y, double pitch_x, double bound, double allowed,
-                    Progress& progress);
+double tried_radius(const LightTerms& terms, std::vector<KernelIntegrals>& integrals, const PlaneLight& light,
+                    const std::vector<Square>& squares, const std::vector<Square>& wide, double pitch_y, double pitch_x,
+                    double bound, double allowed, Progress& progress);
 
 // Squares that `solve_adaptive` lights by one beam each, within their fraction of the tolerance.
 std::vector<Square> beam_squares(const Plane& plane, const PlaneLight& light, double tolerance);

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <numbers>
+#include <utility>
 
 #include "base/threads.h"
 
@@ -19,28 +20,6 @@ double window(double s)
 {
     const double inside = std::max(0.0, 1.0 - s * s);
     return std::pow(1.0 - std::pow(inside, 4), 4);
-}
-
-// Integrals over texels at the points of a level's grid. On the texels' own grid they share borders.
-TexelIntegrals integrate_quadrant(const RadialProfile& profile, const GridLevel& texels, const GridLevel& level,
-                                  std::size_t height, std::size_t width)
-{
-    const double x0 = -0.5 * texels.pitch_x;
-    const double y0 = -0.5 * texels.pitch_y;
-    if (level.pitch_x == texels.pitch_x && level.pitch_y == texels.pitch_y)
-        return integrate_texels(profile, {x0, y0, texels.pitch_x, texels.pitch_y, width, height});
-    TexelIntegrals out(profile.harmonics(), height * width);
-    parallel_for(height * width, [&](std::size_t at) {
-        const std::size_t row = at / width;
-        const double x = x0 + static_cast<double>(at - row * width) * level.pitch_x;
-        const double y = y0 + static_cast<double>(row) * level.pitch_y;
-        const TexelIntegrals texel = integrate_texels(profile, {x, y, texels.pitch_x, texels.pitch_y, 1, 1});
-        for (std::size_t m = 0; m < out.harmonics; ++m) {
-            out.cosine[m * height * width + at] = texel.cosine[m];
-            out.sine[m * height * width + at] = texel.sine[m];
-        }
-    });
-    return out;
 }
 
 }  // namespace
@@ -76,16 +55,87 @@ std::vector<GridLevel> grid_levels(std::size_t height, std::size_t width, double
     }
 }
 
-MultilevelKernel::MultilevelKernel(const RadialProfile& profile, const std::vector<GridLevel>& levels)
+void KernelIntegrals::Points::copy(std::size_t to, const Points& from, std::size_t at)
 {
+    for (std::size_t m = 0; m < integrals.harmonics; ++m) {
+        integrals.cosine[m * height * width + to] = from.integrals.cosine[m * from.height * from.width + at];
+        integrals.sine[m * height * width + to] = from.integrals.sine[m * from.height * from.width + at];
+    }
+}
+
+void KernelIntegrals::Points::mirror(std::size_t to, std::size_t from)
+{
+    // phi becomes pi / 2 - phi.
+    for (std::size_t m = 0; m < integrals.harmonics; ++m) {
+        const std::size_t first = m * height * width;
+        double cosine = integrals.cosine[first + from];
+        double sine = integrals.sine[first + from];
+        if (m % 2 == 1)
+            std::swap(cosine, sine);
+        integrals.cosine[first + to] = m % 4 >= 2 ? -cosine : cosine;
+        integrals.sine[first + to] = m % 4 == 0 || m % 4 == 3 ? -sine : sine;
+    }
+}
+
+std::shared_ptr<const KernelIntegrals::Points> KernelIntegrals::find(const GridLevel& texels, const GridLevel& level,
+                                                                     std::size_t height, std::size_t width)
+{
+    std::shared_ptr<const Points>& known = m_points[{level.pitch_y, level.pitch_x}];
+    if (known && known->height >= height && known->width >= width)
+        return known;
+    if (known) {
+        height = std::max(height, known->height);
+        width = std::max(width, known->width);
+    }
+    const double x0 = -0.5 * texels.pitch_x;
+    const double y0 = -0.5 * texels.pitch_y;
+    // On their own grid texels share borders.
+    if (level.pitch_x == texels.pitch_x && level.pitch_y == texels.pitch_y) {
+        known = std::make_shared<const Points>(
+            height, width, integrate_texels(m_profile, {x0, y0, texels.pitch_x, texels.pitch_y, width, height}));
+        return known;
+    }
+    Points points{height, width, TexelIntegrals(m_profile.harmonics(), height * width)};
+    const auto is_known = [&](std::size_t row, std::size_t column) {
+        return known && row < known->height && column < known->width;
+    };
+    const bool is_square = level.pitch_x == level.pitch_y && texels.pitch_x == texels.pitch_y;
+    const auto is_mirrored = [&](std::size_t row, std::size_t column) {
+        return is_square && row > column && row < width;
+    };
+    parallel_for(height * width, [&](std::size_t at) {
+        const std::size_t row = at / width;
+        const std::size_t column = at - row * width;
+        if (is_known(row, column)) {
+            points.copy(at, *known, row * known->width + column);
+        } else if (!is_mirrored(row, column)) {
+            const double x = x0 + static_cast<double>(column) * level.pitch_x;
+            const double y = y0 + static_cast<double>(row) * level.pitch_y;
+            const TexelGrid texel{x, y, texels.pitch_x, texels.pitch_y, 1, 1};
+            points.copy(at, {1, 1, integrate_texels(m_profile, texel)}, 0);
+        }
+    });
+    for (std::size_t row = 0; row < height; ++row)
+        for (std::size_t column = 0; column < width; ++column)
+            if (!is_known(row, column) && is_mirrored(row, column))
+                points.mirror(row * width + column, column * width + row);
+    known = std::make_shared<const Points>(std::move(points));
+    return known;
+}
+
+MultilevelKernel::MultilevelKernel(KernelIntegrals& integrals, const std::vector<GridLevel>& levels, LitTexels lit)
+{
+    // On coarser grids a texel's light lies on points up to 3 beside it.
+    constexpr std::size_t margin = 5;
     for (std::size_t k = 0; k < levels.size(); ++k) {
         const GridLevel& level = levels[k];
         const bool last = k + 1 == levels.size();
         const auto points = [&](std::size_t size, double pitch) {
-            return last ? size : std::min(size, static_cast<std::size_t>(std::ceil(level.near_radius / pitch)) + 1);
+            const std::size_t farthest = lit == LitTexels::middle ? std::min(size, size / 2 + margin) : size;
+            return last ? farthest : std::min(size, static_cast<std::size_t>(std::ceil(level.near_radius / pitch)) + 1);
         };
         Quadrant quadrant{points(level.height, level.pitch_y), points(level.width, level.pitch_x), {}, {}};
-        quadrant.integrals = integrate_quadrant(profile, levels.front(), level, quadrant.height, quadrant.width);
+        quadrant.points = integrals.find(levels.front(), level, quadrant.height, quadrant.width);
         for (std::size_t i = 0; i < quadrant.height; ++i)
             for (std::size_t j = 0; j < quadrant.width; ++j) {
                 const double r =
@@ -102,24 +152,25 @@ MultilevelKernel::MultilevelKernel(const RadialProfile& profile, const std::vect
 std::vector<KernelTable> MultilevelKernel::tables(const HarmonicSum& harmonics) const
 {
     std::vector<std::size_t> present;  // several for light of one direction alone
-    for (std::size_t m = 0; m < m_levels.front().integrals.harmonics; ++m)
+    for (std::size_t m = 0; m < m_levels.front().points->integrals.harmonics; ++m)
         if (harmonics.cosine[m] != 0.0 || harmonics.sine[m] != 0.0)
             present.push_back(m);
     std::vector<KernelTable> tables;
     for (const Quadrant& level : m_levels) {
         KernelTable& table = tables.emplace_back(level.height - 1, level.width - 1);
-        const std::size_t points = level.height * level.width;
+        const TexelIntegrals& integrals = level.points->integrals;
+        const std::size_t points = level.points->height * level.points->width;
         parallel_for(level.height, [&](std::size_t i) {
             const auto dy = static_cast<std::ptrdiff_t>(i);
             for (std::size_t j = 0; j < level.width; ++j) {
                 // Sum by the parity of m, for the symmetries phi -> -phi (dy < 0) and phi -> pi - phi (dx < 0).
                 std::array<double, 2> cosine{};
                 std::array<double, 2> sine{};
-                const std::size_t point = i * level.width + j;
+                const double weight = level.window[i * level.width + j];
+                const std::size_t point = i * level.points->width + j;
                 for (const std::size_t m : present) {
-                    const double weight = level.window[point];
-                    cosine[m % 2] += weight * harmonics.cosine[m] * level.integrals.cosine[m * points + point];
-                    sine[m % 2] += weight * harmonics.sine[m] * level.integrals.sine[m * points + point];
+                    cosine[m % 2] += weight * harmonics.cosine[m] * integrals.cosine[m * points + point];
+                    sine[m % 2] += weight * harmonics.sine[m] * integrals.sine[m * points + point];
                 }
                 const auto dx = static_cast<std::ptrdiff_t>(j);
                 table.row(dy)[dx] = cosine[0] + cosine[1] + sine[0] + sine[1];

@@ -200,11 +200,19 @@ Grid term_light(const LightTerms& terms, std::size_t t)
     return grid;
 }
 
+std::vector<KernelIntegrals> kernel_integrals(const LightTerms& terms)
+{
+    std::vector<KernelIntegrals> integrals;
+    for (const auto& known : terms.profiles)
+        integrals.emplace_back(known.profile);
+    return integrals;
+}
+
 Grid TermSums::sum(std::size_t t, Grid light, Progress& progress, double work, const Targets* only)
 {
     const std::size_t profile = term_profile(m_terms, t);
     if (!m_kernels.contains(profile))
-        m_kernels.emplace(profile, MultilevelKernel(m_terms.profiles[profile].profile, m_levels));
+        m_kernels.emplace(profile, MultilevelKernel(m_integrals[profile], m_levels, m_lit));
     return multilevel_sum(m_levels, m_kernels.at(profile).tables(term_kernel(m_terms, t)), std::move(light), progress,
                           work, only);
 }

@@ -3,6 +3,8 @@
 
 #include <cstddef>
 #include <map>
+#include <memory>
+#include <utility>
 #include <vector>
 
 #include "base/progress.h"
@@ -101,6 +103,35 @@ struct HarmonicSum {
     Harmonics sine{};
 };
 
+// Integrals of one profile over texels at the points of grids. Sums with other near radii, and the kernel of wide beams,
+// have grids of the same pitches: each integral is found once.
+class KernelIntegrals {
+public:
+    explicit KernelIntegrals(const RadialProfile& profile) : m_profile(profile) {}
+
+    // Offsets (0 .. height - 1, 0 .. width - 1) of a grid; other quadrants follow by symmetry.
+    struct Points {
+        std::size_t height;
+        std::size_t width;
+        TexelIntegrals integrals;
+
+        void copy(std::size_t to, const Points& from, std::size_t at);
+        // Sets a point to the mirror image of another, on the other side of the diagonal.
+        void mirror(std::size_t to, std::size_t from);
+    };
+
+    // At least as many points of a level's grid; `texels` is the finest level.
+    std::shared_ptr<const Points> find(const GridLevel& texels, const GridLevel& level, std::size_t height,
+                                       std::size_t width);
+
+private:
+    const RadialProfile& m_profile;
+    std::map<std::pair<double, double>, std::shared_ptr<const Points>> m_points;  // by the pitches
+};
+
+// Texels of the finest grid that may have light: all, or the middle one alone.
+enum class LitTexels { all, middle };
+
 // Kernels of one profile, the power from a texel's beam in another texel, by multilevel summation (Hardy et al. 2009,
 // doi:10.1016/j.parco.2008.12.005): the sum over levels k of
 //   K_k(r) = K(r) w_0(r) ... w_k-1(r) (1 - w_k(r)).
@@ -108,19 +139,18 @@ struct HarmonicSum {
 // k and zero beyond its near radius.
 class MultilevelKernel {
 public:
-    MultilevelKernel(const RadialProfile& profile, const std::vector<GridLevel>& levels);
+    MultilevelKernel(KernelIntegrals& integrals, const std::vector<GridLevel>& levels, LitTexels lit);
 
     // K_k for each level.
     std::vector<KernelTable> tables(const HarmonicSum& harmonics) const;
 
 private:
-    // Integrals for the offsets (0 .. height - 1, 0 .. width - 1) of a level's grid; other quadrants follow by
-    // symmetry.
+    // The offsets (0 .. height - 1, 0 .. width - 1) of a level's grid.
     struct Quadrant {
         std::size_t height;
         std::size_t width;
-        TexelIntegrals integrals;
-        std::vector<double> window;  // factor of K
+        std::shared_ptr<const KernelIntegrals::Points> points;  // these and perhaps more
+        std::vector<double> window;                             // factor of K
     };
     std::vector<Quadrant> m_levels;
 };
@@ -138,17 +168,26 @@ Grid multilevel_sum(const std::vector<GridLevel>& levels, const std::vector<Kern
 // Light of one term on the plane.
 Grid term_light(const LightTerms& terms, std::size_t t);
 
+// The integrals of each profile of the terms.
+std::vector<KernelIntegrals> kernel_integrals(const LightTerms& terms);
+
 // Multilevel sums of terms. Caches the kernel of each profile.
 class TermSums {
 public:
-    TermSums(const LightTerms& terms, std::vector<GridLevel> levels) : m_terms(terms), m_levels(std::move(levels)) {}
+    TermSums(const LightTerms& terms, std::vector<KernelIntegrals>& integrals, std::vector<GridLevel> levels,
+             LitTexels lit = LitTexels::all)
+        : m_terms(terms), m_integrals(integrals), m_levels(std::move(levels)), m_lit(lit)
+    {
+    }
 
     // Sum of term t, for all targets or `only` some.
     Grid sum(std::size_t t, Grid light, Progress& progress, double work, const Targets* only = nullptr);
 
 private:
     const LightTerms& m_terms;
+    std::vector<KernelIntegrals>& m_integrals;  // [profile]
     std::vector<GridLevel> m_levels;
+    LitTexels m_lit;
     std::map<std::size_t, MultilevelKernel> m_kernels;
 };
 

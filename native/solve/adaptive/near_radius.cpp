@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <limits>
 #include <numeric>
 
 #include "base/constants.h"
@@ -50,8 +51,9 @@ double kernel_at(const RadialProfile& profile, const Vec2& point)
 
 // Sum of absolute errors for a beam of unit power: of the kernel against its interpolation from points of the spacing
 // of the grid at that distance, along `axis` relative to the beam. Most of it is noise of simulated profiles, for which
-// there is no formula.
-double interpolation_error(const RadialProfile& profile, const Vec2& axis, double near, double first, double last)
+// there is no formula. Infinite if it is more than `most`, which ends it early.
+double interpolation_error(const RadialProfile& profile, const Vec2& axis, double near, double first, double last,
+                           double most)
 {
     // Ratio: half the distance of the points, over distance / near. The window has risen to one half at .6 of the near
     // radius. Larger: smaller errors, more time.
@@ -60,8 +62,9 @@ double interpolation_error(const RadialProfile& profile, const Vec2& axis, doubl
     const int rings = static_cast<int>(std::ceil(2.0 * std::log2(last / first))) + 1;
     const int directions = 2 * static_cast<int>(profile.harmonics()) + 3;
     const double log_step = std::log(last / first) / rings;
+    const double scale = log_step * 2.0 * pi / directions;
     double sum = 0.0;
-    for (int i = 0; i < rings; ++i) {
+    for (int i = 0; i < rings && sum * scale <= most; ++i) {
         const double r = first * std::exp((i + 0.5) * log_step);
         const double step = spacing * r / near;
         for (int j = 0; j < directions; ++j) {
@@ -78,7 +81,7 @@ double interpolation_error(const RadialProfile& profile, const Vec2& axis, doubl
             sum += 2.0 * (error(step * axis) + error(step * Vec2(-axis.y, axis.x))) * r * r;
         }
     }
-    return sum * log_step * 2.0 * pi / directions;
+    return sum * scale <= most ? sum * scale : std::numeric_limits<double>::infinity();
 }
 
 // First texels of the probed blocks.
@@ -117,30 +120,36 @@ double near_radius(const std::vector<AngleLight>& lights, double pitch, double d
     double power = 0.0;
     for (const AngleLight& light : lights)
         power += light.power * 2.0 * pi * light.profile.cumulative(distance)[0];
+    const double most = allowed * std::max(power, 0.0);
+    // Infinite if more than `most`.
     const auto error_bound = [&](double near) {
         const double first = 0.5 * near * pitch;
         if (first >= distance)
             return 0.0;
         double sum = 0.0;
         for (const AngleLight& light : lights) {
-            const auto error = [&](const Vec2& axis) {
-                return interpolation_error(light.profile, axis, near, first, distance);
-            };
-            sum += light.power * std::max(error({1.0, 0.0}), error({std::sqrt(0.5), std::sqrt(0.5)}));
+            const double left = (most - sum) / light.power;
+            double error = 0.0;
+            for (const Vec2& axis : {Vec2(1.0, 0.0), Vec2(std::sqrt(0.5), std::sqrt(0.5))})
+                if (error <= left)
+                    error = std::max(error, interpolation_error(light.profile, axis, near, first, distance, left));
+            sum += light.power * error;
             progress.advance(0.0);
+            if (sum > most)
+                break;
         }
         return sum;
     };
     constexpr double growth = 1.2;  // of tried radii; larger: larger radii, less time for the search
     double near = min_near_radius;
-    while (error_bound(near) > allowed * std::max(power, 0.0))
+    while (error_bound(near) > most)
         near *= growth;
     return near;
 }
 
-double tried_radius(const LightTerms& terms, const PlaneLight& light, const std::vector<Square>& squares,
-                    const std::vector<Square>& wide, double pitch_y, double pitch_x, double bound, double allowed,
-                    Progress& progress)
+double tried_radius(const LightTerms& terms, std::vector<KernelIntegrals>& integrals, const PlaneLight& light,
+                    const std::vector<Square>& squares, const std::vector<Square>& wide, double pitch_y, double pitch_x,
+                    double bound, double allowed, Progress& progress)
 {
     const std::size_t height = terms.plane.height;
     const std::size_t width = terms.plane.width;
@@ -161,12 +170,13 @@ double tried_radius(const LightTerms& terms, const PlaneLight& light, const std:
 
     std::vector<TermSums> sums;
     for (const double radius : radii)
-        sums.emplace_back(terms, grid_levels(height, width, pitch_y, pitch_x, radius));
+        sums.emplace_back(terms, integrals, grid_levels(height, width, pitch_y, pitch_x, radius));
     std::vector<Grid> radiance(radii.size(), Grid(height, width));
     for (std::size_t t = 0; t < terms.terms.size(); ++t) {
         Grid beams = term_light(terms, t);
         take_steps(beams, wide);
-        for (std::size_t i = 0; i < radii.size(); ++i) {
+        // The largest radius comes first: others need a part of its integrals.
+        for (std::size_t i = radii.size(); i-- > 0;) {
             const Grid part = sums[i].sum(t, beams, progress, 0.0, &targets);
             add_scaled(radiance[i].values.data(), part.values.data(), 1.0, part.values.size());
         }
