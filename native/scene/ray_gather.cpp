@@ -64,11 +64,13 @@ public:
     // Traces few rays from all texels, to find where they and their neighbors need more.
     void trace_first(Progress& progress)
     {
+        if (!m_first_pass)
+            return;
         constexpr std::size_t rows = FirstPass::tile_side;
         parallel_for((m_grid.height + rows - 1) / rows, [&](std::size_t i) {
             const std::size_t end = std::min((i + 1) * rows, m_grid.height);
             for (std::size_t y = i * rows; y < end; ++y)
-                trace_first(y);
+                trace_first(y, *m_first_pass);
             progress.advance(static_cast<double>(end - i * rows));
         });
         m_first_pass->search([this](std::span<const Vec2> positions, std::span<const Vec2> places,
@@ -78,7 +80,7 @@ public:
     void gather_row(std::size_t y, RaySink& sink)
     {
         Work& work = m_work.local();
-        if (has_first_pass())
+        if (m_first_pass)
             work.row.find(*m_first_pass, y);
         for (std::size_t x = 0; x < m_grid.width; x += texels_at_once) {
             const Span span{y, x, std::min(texels_at_once, m_grid.width - x)};
@@ -179,8 +181,8 @@ private:
     // True if nothing blocks rays of any texel.
     bool is_open() const { return !m_occluders && m_even_rays > 0; }
 
-    // Traces few rays from a row.
-    void trace_first(std::size_t y)
+    // Traces few rays from a row, and notes them.
+    void trace_first(std::size_t y, FirstPass& pass)
     {
         Work& work = m_work.local();
         for (std::size_t x = 0; x < m_grid.width; x += texels_at_once) {
@@ -197,7 +199,7 @@ private:
                     gather_texel(i, {&m_even_sobol, 0, m_even_rays, m_even_rays, true}, work);
             trace(work);
             for (std::size_t i = 0; i < span.width; i += FirstPass::tile_side)
-                note(i, std::min(FirstPass::tile_side, span.width - i), work);
+                note(i, std::min(FirstPass::tile_side, span.width - i), work, pass);
         }
     }
 
@@ -210,7 +212,7 @@ private:
     }
 
     // Notes the first rays of texels [first, first + count) of a span, which lie in one tile.
-    void note(std::size_t first, std::size_t count, Work& work)
+    void note(std::size_t first, std::size_t count, Work& work, FirstPass& pass) const
     {
         work.arrived.clear();
         for (std::size_t i = 0; i < m_even_rays; ++i)
@@ -219,8 +221,8 @@ private:
                 if (work.irradiance[index] != Vec3f(0.0f))
                     work.arrived.push_back(work.hits[index]);
             }
-        m_first_pass->note(work.span.x + first, work.span.y, std::span(work.met).subspan(first, count),
-                           std::span(work.first).subspan(first, count), work.arrived);
+        pass.note(work.span.x + first, work.span.y, std::span(work.met).subspan(first, count),
+                  std::span(work.first).subspan(first, count), work.arrived);
     }
 
     // Mean of the channels.
