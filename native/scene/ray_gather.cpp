@@ -50,11 +50,10 @@ public:
           m_even_sobol(std::max<std::size_t>(m_even_rays, 1), settings.seed),
           m_rays(grid, occluders, settings.clearance)
     {
-        if (occluders && m_even_rays > 0 && m_even_rays < m_ray_count) {
+        if (occluders && m_even_rays > 0 && m_even_rays < m_ray_count)
             m_first_pass.emplace(grid.width, grid.height, m_even_rays, m_ray_count, settings.seed);
-            if (settings.find_shadows)
-                m_open_tiles.emplace(grid, m_light, *occluders, m_rays.start(), FirstPass::tile_side);
-        }
+        if (occluders && settings.find_shadows)
+            m_open_tiles.emplace(grid, m_light, *occluders, m_rays.start(), FirstPass::tile_side);
         if (settings.noise)
             m_noise.resize(grid.height);
     }
@@ -178,6 +177,9 @@ private:
         return has_first_pass() ? work.row.rays(x) : is_open() ? m_even_rays : m_ray_count;
     }
 
+    // True if nothing blocks rays of this texel, nor of those around.
+    bool is_in_open_tile(std::size_t x, std::size_t y) const { return m_open_tiles && m_open_tiles->is_open(x, y); }
+
     // True if nothing blocks rays of any texel.
     bool is_open() const { return !m_occluders && m_even_rays > 0; }
 
@@ -193,7 +195,7 @@ private:
             work.met.assign(span.width, Met::nothing);
             work.first.assign(span.width, {});
             for (std::size_t i = 0; i < span.width; ++i)
-                if (m_open_tiles && m_open_tiles->is_open(span.x + i, y))
+                if (is_in_open_tile(span.x + i, y))
                     note_open(i, work);
                 else
                     gather_texel(i, {&m_even_sobol, 0, m_even_rays, m_even_rays, true}, work);
@@ -256,7 +258,8 @@ private:
             const std::size_t all = rays_of(work, span.x + i);
             if (first >= all)
                 continue;
-            Part part{&m_sobol, first, std::min(count, all - first), all, m_occluders != nullptr};
+            Part part{&m_sobol, first, std::min(count, all - first), all,
+                      m_occluders != nullptr && !is_in_open_tile(span.x + i, span.y)};
             if (method_here == RayMethod::open)
                 part = {&m_even_sobol, first, part.count, all, false};
             else if (method_here == RayMethod::guided)

@@ -109,9 +109,10 @@ def sized_light(kind, slant, height, axes, centre):
     lamp_height=st.sampled_from([0.3, 1.0, 5.0]),
     clearance=st.sampled_from([0.0, 0.05]),
     far=st.sampled_from([0, 1e4]),
+    even_rays=st.sampled_from([0, 4]),
 )
 def test_tiles_that_no_light_of_a_size_shades_are_as_if_traced(
-    light, kind, seed, count, slant, lamp_height, clearance, far
+    light, kind, seed, count, slant, lamp_height, clearance, far, even_rays
 ):
     """Bit by bit, and for any number of threads."""
     axes, centre, rng = rotation(seed), far * np.array([30.0, -20.0, 10.0]), np.random.default_rng(seed)
@@ -120,7 +121,7 @@ def test_tiles_that_no_light_of_a_size_shades_are_as_if_traced(
     casters = native.Occluders([mesh], centre, max_copied=0)
     lamp = sized_light(light, slant, lamp_height, axes, centre)
     assert gather_beams(grid, lamp, None)[0].max() > 0
-    options = {"rays": 32, "even_rays": 4, "clearance": clearance}
+    options = {"rays": 32, "even_rays": even_rays, "clearance": clearance}
     traced, *others = (
         gather_beams(grid, lamp, casters, find_shadows=find, threads=threads, **options)
         for find, threads in ((False, 0), (True, 1), (True, 3))
