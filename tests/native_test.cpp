@@ -6,6 +6,7 @@
 #include <utility>
 #include <vector>
 
+#include "base/circle.h"
 #include "base/sobol.h"
 #include "fft/fft.h"
 #include "medium/medium.h"
@@ -164,6 +165,9 @@ A subset of "avx512", "avx2" and "baseline". An empty `instruction_set` of the f
           "Transforms of lines of complex values, complex64 (N, size), by e^-i, or backward by e^i; both are plain "
           "sums.");
 
+    m.def("on_circle", py::vectorize([](double turn) { return on_circle(turn).x; }), py::arg("turn"), "cos(2 pi turn).");
+    m.def("on_circle_up", py::vectorize([](double turn) { return on_circle(turn).y; }), py::arg("turn"),
+          "sin(2 pi turn).");
     m.def("sobol_points", &sobol_points, py::arg("side"), py::arg("points_per_cell"), py::arg("count"),
           "The first points of each cell of a square grid: float64 (side * side, count, 4).");
 

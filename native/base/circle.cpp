@@ -1,6 +1,5 @@
 #include "base/circle.h"
 
-#include <algorithm>
 #include <array>
 #include <cmath>
 
@@ -31,12 +30,12 @@ const std::array<Vec2, nodes> circle = make_nodes();
 Vec2 on_circle(double turn)
 {
     const double at = turn * static_cast<double>(nodes);
-    const std::size_t node = std::min(static_cast<std::size_t>(at), nodes - 1);
+    const auto node = static_cast<std::size_t>(at);
     const double rest = (at - static_cast<double>(node) - 0.5) * (2.0 * pi / static_cast<double>(nodes));
     const double squared = rest * rest;
     const double cosine = 1.0 - 0.5 * squared;
     const double sine = rest * (1.0 - squared / 6.0);
-    const Vec2& from = circle[node];
+    const Vec2& from = circle[node % nodes];
     return {from.x * cosine - from.y * sine, from.y * cosine + from.x * sine};
 }
 

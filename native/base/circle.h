@@ -5,7 +5,7 @@
 
 namespace beamspread {
 
-// (cos, sin) of 2 pi `turn`, 0 <= turn <= 1; right to 1e-10.
+// (cos, sin) of 2 pi `turn`, which is not negative; right to 1e-10.
 Vec2 on_circle(double turn);
 
 }  // namespace beamspread

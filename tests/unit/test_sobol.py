@@ -1,4 +1,4 @@
-"""Sobol points of grids' cells, from which rays come."""
+"""Points from which rays come: Sobol's in grids' cells, and those of a circle."""
 
 import _native_test
 import numpy as np
@@ -34,3 +34,10 @@ def test_a_part_of_the_points_leaves_no_interval_out(count):
     for dimension in range(4):
         hits = np.bincount(found[..., dimension].ravel(), minlength=POINTS)
         assert np.abs(hits - cells * part).max() < bound
+
+
+def test_points_of_the_circle():
+    """Turns around it several times as well; 6e-11 is the first term that is left out."""
+    turns = np.concatenate([np.linspace(0, 3, 30_001), np.arange(513) / 512])
+    np.testing.assert_allclose(_native_test.on_circle(turns), np.cos(2 * np.pi * turns), rtol=0, atol=1e-10)
+    np.testing.assert_allclose(_native_test.on_circle_up(turns), np.sin(2 * np.pi * turns), rtol=0, atol=1e-10)
