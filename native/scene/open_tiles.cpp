@@ -66,10 +66,9 @@ private:
 
 OpenTiles::OpenTiles(const ReceiverGrid& grid, const Light& light, const Occluders& occluders, const RayStart& start,
                      std::size_t tile_side)
-    : m_tile_side(tile_side),
-      m_columns((grid.width + tile_side - 1) / tile_side),
-      m_rows((grid.height + tile_side - 1) / tile_side)
+    : m_tile_side(tile_side), m_columns((grid.width + tile_side - 1) / tile_side)
 {
+    const std::size_t tile_rows = (grid.height + tile_side - 1) / tile_side;
     const std::size_t facets = facet_count(occluders);
     const std::vector<LightSource> corners = light.corners();
     if (grid.is_bent() || corners.empty() || facets > grid.texels())
@@ -107,9 +106,9 @@ OpenTiles::OpenTiles(const ReceiverGrid& grid, const Light& light, const Occlude
         };
         Rectangles& own = shaded.local();
         if (own.empty())
-            own = Rectangles(m_columns, m_rows);
-        own.add(tile(columns.low, -1.0, m_columns), tile(columns.high, 2.0, m_columns), tile(rows.low, -1.0, m_rows),
-                tile(rows.high, 2.0, m_rows));
+            own = Rectangles(m_columns, tile_rows);
+        own.add(tile(columns.low, -1.0, m_columns), tile(columns.high, 2.0, m_columns), tile(rows.low, -1.0, tile_rows),
+                tile(rows.high, 2.0, tile_rows));
     };
     parallel_for((facets + facets_at_once - 1) / facets_at_once, [&](std::size_t run) {
         const std::size_t end = std::min((run + 1) * facets_at_once, facets);
@@ -118,7 +117,7 @@ OpenTiles::OpenTiles(const ReceiverGrid& grid, const Light& light, const Occlude
     });
     if (!has_end)
         return;
-    Rectangles all(m_columns, m_rows);
+    Rectangles all(m_columns, tile_rows);
     for (const Rectangles& of_thread : shaded)
         if (!of_thread.empty())
             all.add(of_thread);

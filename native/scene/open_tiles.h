@@ -26,7 +26,7 @@ public:
     }
 
 private:
-    std::size_t m_tile_side, m_columns, m_rows;
+    std::size_t m_tile_side, m_columns;
     std::vector<std::uint8_t> m_is_open;  // [tile]; empty if no tile is open
 };
 

@@ -237,7 +237,7 @@ def test_nothing_is_left_of_an_orphan_whose_folder_went_before_it_began(tmp_path
 
 @IS_POSIX
 def test_an_orphan_whose_parent_ended_before_it_began_removes_its_folder(tmp_path):
-    """Where the parent ends too soon to remove what it has just made: a window closed right after a bake began."""
+    """A window may be closed right after a bake began, before it can remove the folder that it has just made."""
     gone = subprocess.Popen([sys.executable, "-c", ""])
     gone.wait()
     folder = tmp_path / f"{PREFIX}{gone.pid}-abc"

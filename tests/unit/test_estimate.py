@@ -78,7 +78,7 @@ def test_lights_behind_the_receiver_take_no_time():
 
 
 def test_a_texel_traces_few_rays_where_all_or_nothing_is_blocked():
-    """Numbers of rays of native/scene/first_pass.cpp for 512 rays: 8 first ones, and up to all beside obstacles."""
+    """About as native/scene/first_pass.cpp gives them: few first ones, and up to all beside obstacles."""
     assert share_of_rays(None) == share_of_rays(0.0) == share_of_rays(1.0) == 0
     assert share_of_rays(0.5) == share_of_rays(0.9) == 1
     few, some = share_of_rays(0.02), share_of_rays(0.2)

@@ -275,20 +275,12 @@ def channels_of(surface: Surface, lights: Sequence[Light]) -> int:
 
 
 def workloads_of(
-    grids: Sequence[AnyGrid],
-    lights: Sequence[Light],
-    triangles: int,
-    surface: Surface,
-    settings: BakeSettings,
-    bounced: bool = False,
-    unknown: float = 0.0,
-    shares: Sequence[Shares | None] = (None, None),
-    has_all_sides: bool = False,
+    grids: Sequence[AnyGrid], surface: Surface, settings: BakeSettings, shares: Sequence[Shares | None], **rest
 ) -> list[Workload]:
-    """The workload of light on each side of the grids that counts; arguments as of `Workload.of`."""
+    """The workload of light on each side of the grids that counts; arguments as of `Workload.of`, `shares` of each."""
     sides = [grids, *([backs_of(grids)] if has_back(surface.thickness, settings) else [])]
-    rest = triangles, surface, settings, bounced, unknown
-    loads = [Workload.of(side, lights, *rest, there, has_all_sides) for side, there in zip(sides, shares)]
+    known = rest | {"surface": surface, "settings": settings}
+    loads = [Workload.of(side, shares=of_side, **known) for side, of_side in zip(sides, shares)]
     return [load for load in loads if load.is_lit()] or loads[:1]
 
 

@@ -98,8 +98,9 @@ class Forecast:
             seconds = bounced_seconds(self.triangles, finders.around, nodes, self.is_bent, threads, MAX_RAYS)
             steps.append((BouncedLight.name, seconds))
         unknown = max(self.unknown, OF_WORLD * finders.world)
-        rest = bounced, unknown, [finders.around.shares_on(side) for side in range(2)], self.is_bent
-        loads = workloads_of(self.grids, self.lights, self.triangles, self.surface, settings, *rest)
+        shares = [finders.around.shares_on(side) for side in range(2)]
+        light = {"lights": self.lights, "triangles": self.triangles, "bounced": bounced, "unknown": unknown}
+        loads = workloads_of(self.grids, self.surface, settings, shares, has_all_sides=self.is_bent, **light)
         facts = {"pieces": self.pieces, "planes": self.planes}
         known = {"is_bent": self.is_bent, **{name: value for name, value in facts.items() if value}}
         # Each light takes a few rays at least.

@@ -150,10 +150,10 @@ class BakeJob:
         """Facts that decide how long the solution takes, for each side from which light comes."""
         grids, _ = with_edges(self.grids, self.surface, self.name)
         light = self.illumination
-        rest = light.triangle_count, self.surface, self.settings, self.finds_light
         unknown = OF_WORLD * any(step.finds_world for step in self.steps)
         shares = [self.surroundings.shares_on(side) for side in range(2)]
-        return workloads_of(grids, light.lights, *rest, unknown, shares)
+        known = {"lights": light.lights, "triangles": light.triangle_count, "bounced": self.finds_light}
+        return workloads_of(grids, self.surface, self.settings, shares, unknown=unknown, **known)
 
     @cached_property
     def surroundings(self) -> Surroundings:

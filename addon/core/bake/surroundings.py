@@ -128,7 +128,7 @@ def _shares(grid: AnyGrid, illumination: Illumination) -> Shares:
     shares = {}
     for name, light in [(SKY, _sky()), *((light.name, light) for light in lights[:MAX_LIGHTS])]:
         shown, arriving = (
-            irradiance_map(grid, illumination, light, has_shadows, SHARE_TEXELS) for has_shadows in (0, 1)
+            irradiance_map(grid, illumination, light, has_shadows, SHARE_TEXELS) for has_shadows in (False, True)
         )
         parts = np.where(shown > 0, 1 - arriving / np.where(shown > 0, shown, 1.0), np.nan)
         shares[name] = float(np.mean([share_of_rays(None if np.isnan(part) else part) for part in parts.ravel()]))
