@@ -1,5 +1,7 @@
 """Light at the texels of meshes that bend: as on planes if they are flat, closed forms on balls, no acne, no leaks."""
 
+import functools
+
 import numpy as np
 import pytest
 from beamspread.core.native import native
@@ -117,6 +119,13 @@ def test_a_ball_in_an_even_world_receives_pi_everywhere(name):
     assert np.abs(part.mean(axis=-1) - above).max() < 0.06  # noise of 128 rays where the face cuts some off
 
 
+@functools.cache
+def bowl_with_texels(columns, size):
+    """A half ball that opens downward, and its texels."""
+    bowl = ball(columns, columns // 2, inward=True, zenith=np.pi / 2)
+    return bowl, texels_of(bowl, size)
+
+
 @pytest.mark.parametrize(("columns", "size"), [(128, 128), (64, 256), (32, 192), (128, 48)])
 @pytest.mark.parametrize("zenith", [0, 40, 70])
 def test_a_bowl_shades_itself(columns, size, zenith):
@@ -124,8 +133,7 @@ def test_a_bowl_shades_itself(columns, size, zenith):
 
     The shadow's border is uncertain by a texel and by the facets of the bowl: 1 % of the light at most.
     """
-    bowl = ball(columns, columns // 2, inward=True, zenith=np.pi / 2)  # opens downward
-    texels = texels_of(bowl, size)
+    bowl, texels = bowl_with_texels(columns, size)
     travel = np.array((np.sin(np.radians(zenith)), 0, np.cos(np.radians(zenith))))
     light = native.gather_rays(texels.native(), native.SunLight(travel, 0.0), bowl.occluders())[0][..., 0]
     entry = texels.positions - 2 * (texels.positions @ travel)[..., None] * travel

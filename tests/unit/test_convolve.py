@@ -123,9 +123,9 @@ def test_several_lights_add_up(library):
     rng = np.random.default_rng(10)
     colour = np.array([1.0, 0.5, 0.2], np.float32)
     lights = [
-        (rng.random((40, 50), np.float32), travel(30, 0)),
-        (rng.random((40, 50, 1), np.float32) * colour, lamp_directions(40, 50)),
-        (rng.random((40, 50, 3), np.float32), lamp_directions(40, 50, 0.1)),
+        (rng.random((26, 33), np.float32), travel(30, 0)),
+        (rng.random((26, 33, 1), np.float32) * colour, lamp_directions(26, 33)),
+        (rng.random((26, 33, 3), np.float32), lamp_directions(26, 33, 0.1)),
     ]
     rest = (library, ALBEDO, 0.8, 1.0)
     expected = sum(convolve(*light, *rest, solver="direct") for light in lights)
@@ -260,9 +260,10 @@ def test_channels_may_have_media_of_their_own(library):
 
 @pytest.mark.parametrize("solver", ["fft", "direct", "adaptive"])
 def test_same_bits_for_any_number_of_threads(library, solver):
-    beams = np.random.default_rng(7).random((45, 67, 3)).astype(np.float32)
-    beams[:, 20:40] = 0
-    for direction in (travel(30, 30), lamp_directions(45, 67)):
+    height, width = (27, 40) if solver == "direct" else (45, 67)
+    beams = np.random.default_rng(7).random((height, width, 3)).astype(np.float32)
+    beams[:, 20:30] = 0
+    for direction in (travel(30, 30), lamp_directions(height, width)):
         runs = [convolve(beams, direction, library, ALBEDO, 4.0, 1.0, solver=solver, threads=n) for n in (1, 2, 3)]
         assert np.array_equal(runs[0], runs[1])
         assert np.array_equal(runs[0], runs[2])
