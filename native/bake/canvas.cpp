@@ -36,6 +36,12 @@ constexpr std::size_t min_patches = 8;
 constexpr std::size_t small_patch = std::size_t{1} << 14;
 constexpr double max_padding = 6.0;
 
+// Least width and height of patches on one divided plane, relative to the first. Smaller: more padding.
+constexpr double same_size = 0.75;
+
+// Largest patch of a divided plane, texels. Larger patches choose a coarse grid for light that spreads far.
+constexpr std::size_t max_divided_patch = 400 * 400;
+
 // Radius within which a medium spreads all light but the part `max_beyond`, metres.
 double reach(const ChannelMedium& medium)
 {
@@ -82,11 +88,15 @@ std::size_t gap_texels(double gap, double pitch)
     return static_cast<std::size_t>(std::ceil(gap / pitch));
 }
 
-double area_of(const Plane& plane, const std::vector<Patch>& patches)
+std::size_t texels_of(std::span<const Patch> patches)
 {
     const auto add = [](std::size_t sum, const Patch& patch) { return sum + patch.surface->samples(); };
-    const std::size_t texels = std::accumulate(patches.begin(), patches.end(), std::size_t{0}, add);
-    return static_cast<double>(texels) * plane.pitch_x * plane.pitch_y;
+    return std::accumulate(patches.begin(), patches.end(), std::size_t{0}, add);
+}
+
+double area_of(const Plane& plane, std::span<const Patch> patches)
+{
+    return static_cast<double>(texels_of(patches)) * plane.pitch_x * plane.pitch_y;
 }
 
 std::size_t padded_texels(const Surface& surface, const Plane& gaps)
@@ -155,7 +165,56 @@ std::vector<std::vector<Patch>> by_pitch(const std::vector<Surface>& surfaces)
     return groups;
 }
 
-// Splits a group into canvases.
+bool return_unscattered(const ChannelMedium& medium)
+{
+    return std::ranges::any_of(medium.ldf->ballistic(grazing, medium.side),
+                               [](const BallisticExit& exit) { return exit.power > 0.0; });
+}
+
+bool have_same_size(const Surface& first, const Surface& other)
+{
+    const auto are_near = [](std::size_t a, std::size_t b) {
+        const auto [smaller, larger] = std::minmax(static_cast<double>(a), static_cast<double>(b));
+        return smaller >= same_size * larger;
+    };
+    return are_near(first.grid.width, other.grid.width) && are_near(first.grid.height, other.grid.height);
+}
+
+// Divided planes of patches of about one size. Returns the other patches, from the largest to the smallest.
+std::vector<Patch> add_divided(std::vector<Patch> group, std::size_t max_texels, std::vector<Canvas>& all)
+{
+    std::vector<Patch> others;
+    while (!group.empty()) {
+        const Surface& first = *group.front().surface;
+        const auto rest = std::ranges::stable_partition(
+            group, [&](const Patch& patch) { return have_same_size(first, *patch.surface); });
+        std::vector<Patch> same(group.begin(), rest.begin());
+        group.erase(group.begin(), rest.begin());
+        if (same.size() < min_patches || first.samples() > max_divided_patch) {
+            others.insert(others.end(), same.begin(), same.end());
+            continue;
+        }
+        std::ranges::stable_sort(same, std::greater{}, [](const Patch& patch) { return patch.surface->grid.height; });
+        const auto canvas_count =
+            static_cast<std::size_t>(std::ceil(static_cast<double>(texels_of(same)) / static_cast<double>(max_texels)));
+        const std::size_t each = (same.size() + canvas_count - 1) / canvas_count;
+        for (std::size_t i = 0; i < same.size(); i += each) {
+            const std::span<Patch> patches = std::span(same).subspan(i, std::min(each, same.size() - i));
+            Plane plane{.width = 0, .height = 0, .pitch_x = first.grid.pitch_x, .pitch_y = first.grid.pitch_y};
+            std::size_t widest = 0;
+            for (const Patch& patch : patches) {
+                plane.extent = std::max(plane.extent, diagonal(*patch.surface));
+                widest = std::max(widest, patch.surface->grid.width);
+            }
+            const auto side = static_cast<std::size_t>(std::sqrt(texels_of(patches)));
+            all.emplace_back(patches, std::max(widest, side), plane);
+        }
+    }
+    std::ranges::stable_sort(others, std::greater{}, [](const Patch& patch) { return patch.surface->samples(); });
+    return others;
+}
+
+// Splits a group into canvases with gaps.
 void add_canvases(std::vector<Patch> group, double all_reach, std::size_t max_texels, std::vector<Canvas>& all)
 {
     const auto gaps_of = [&](const Patch& largest) {
@@ -210,9 +269,11 @@ std::vector<Canvas> canvases(const std::vector<Surface>& surfaces, const std::ve
     for (std::size_t i = 0; i < surfaces.size(); ++i)
         if (!surfaces[i].grid.is_bent() && (!are_packed || surfaces[i].mirrored > 0.0))
             all.emplace_back(surfaces[i], i);
+    const bool is_divided = !std::ranges::any_of(media, return_unscattered);
     for (std::vector<Patch>& group : by_pitch(surfaces))
         if (are_packed)
-            add_canvases(std::move(group), all_reach, max_texels, all);
+            add_canvases(is_divided ? add_divided(std::move(group), max_texels, all) : std::move(group), all_reach,
+                         max_texels, all);
     return all;
 }
 

@@ -26,7 +26,7 @@ struct Canvas {
     // A surface alone, with its mirror images.
     explicit Canvas(const Surface& surface, std::size_t index = 0);
 
-    // Patches with gaps, `side` texels wide.
+    // Patches with gaps, which may be 0, `side` texels wide.
     Canvas(std::span<const Patch> unplaced, std::size_t side, const Plane& gaps);
 
     std::size_t samples() const { return plane.texels(); }
@@ -44,9 +44,9 @@ struct Canvas {
     }
 };
 
-// Canvases of all planes among the surfaces, which share one if their texels are of one size. Light of one patch does not reach another:
-// the gaps follow from the reach of the media. `max_texels`: of a canvas of several patches;
-// 0: each surface stays alone.
+// Canvases of all planes among the surfaces, which share one if their texels are of one size. Light of one patch does
+// not reach another: patches of about one size lie on a divided plane, others have gaps that follow from the reach of
+// the media. `max_texels`: of a canvas of several patches; 0: each surface stays alone.
 std::vector<Canvas> canvases(const std::vector<Surface>& surfaces, const std::vector<ChannelMedium>& media,
                              std::size_t max_texels);
 

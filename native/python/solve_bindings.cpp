@@ -1,5 +1,7 @@
 // Python names of native/solve: PlaneLight, convolve, adaptive_beams.
+#include <algorithm>
 #include <array>
+#include <cmath>
 #include <cstdint>
 #include <string>
 #include <tuple>
@@ -64,9 +66,17 @@ std::vector<HeldLight> lights_of(const Plane2D& irradiance, const Array<float>& 
 Array<float> convolve(const Lights& lights, const Sources& ldf, const std::vector<double>& albedo,
                       const std::vector<double>& mean_free_path, std::array<double, 2> pitch, const std::string& solver,
                       double tolerance, int threads, const py::object& progress, std::size_t memory,
-                      std::size_t coarsening, const std::string& side)
+                      std::size_t coarsening, const std::string& side,
+                      const std::vector<std::array<std::size_t, 4>>& parts)
 {
     Problem problem = problem_of(lights, ldf, albedo, mean_free_path, pitch, tolerance, side);
+    for (const auto& [y, x, height, width] : parts) {
+        if (y + height > problem.plane.height || x + width > problem.plane.width || height * width == 0)
+            reject("parts", "a part beyond the plane", "rectangles of texels of the plane");
+        problem.plane.parts.push_back({y, x, height, width});
+        problem.plane.extent = std::max(problem.plane.extent, std::hypot(static_cast<double>(width) * pitch[0],
+                                                                         static_cast<double>(height) * pitch[1]));
+    }
     problem.solver = named_solver(solver);
     problem.threads = threads;
     problem.memory = memory;
@@ -128,7 +138,7 @@ color : sequence of float
     m.def("convolve", &convolve, py::arg("lights"), py::arg("ldf"), py::arg("albedo"), py::arg("mean_free_path"),
           py::arg("pitch"), py::arg("solver"), py::arg("tolerance"), py::arg("threads"), py::arg("progress"),
           py::arg("memory") = Problem().memory, py::arg("coarsening") = Problem().coarsening,
-          py::arg("side") = "reflected",
+          py::arg("side") = "reflected", py::arg("parts") = std::vector<std::array<std::size_t, 4>>(),
           R"(Luminance of lights on a grid; the engine behind `beamspread.convolve`.
 
 C libraries, albedos and mean free paths (metres), pitch (x, y) in metres; returns float32 (H, W, C) in W/(m^2 sr).
@@ -136,6 +146,7 @@ C libraries, albedos and mean free paths (metres), pitch (x, y) in metres; retur
 `coarsening`: texels from node to node of the grid on which it spreads light far: 4, 8, 16, ... 64, 1 for no such grid,
 0 for what costs least.
 `side`: of the luminance, 'reflected' where light enters or 'transmitted' at the same texels of a slab's far side.
+`parts`: (row, column, height, width) of each part of a divided plane, on which the solver 'fft' keeps light.
 )");
     m.def("adaptive_beams", &adaptive_beams, py::arg("light"), py::arg("tolerance"),
           R"(Squares that the adaptive solver lights by one beam each; the engine behind `beamspread.adaptive_beams`.

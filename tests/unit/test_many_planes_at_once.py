@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from beamspread import Medium, _native, simulate
 from beamspread.core.bake.bake_settings import BakeSettings
 from beamspread.core.bake.steps import NoiseSum
 from beamspread.core.material import Material
@@ -30,6 +31,11 @@ LIGHTS = {
     "area": AreaLight("Area", 3.0, WHITE, True, (0.2, 0.2, 0.4), AXES, 0.2, 0.2, False, math.pi),
     "world": WorldLight("World", 1.0, WHITE, True, np.random.default_rng(1).random((16, 32, 3), np.float32), AXES),
 }
+
+
+@pytest.fixture(scope="module")
+def library():
+    return simulate(Medium(ior=1.4), angles=[0, 30, 60, 80], photons=2000)
 
 
 def planks(count=10, side=50):
@@ -89,6 +95,27 @@ def test_light_that_was_computed_elsewhere_is_that_of_each_plane():
 def test_light_that_a_slab_returns_unscattered_stays_on_its_plane():
     """It lands up to twice the thickness away."""
     assert largest_difference(*together_and_alone(("sun",), 0.01, planks(8, side=30), ior=1.33, thickness=0.02)) < 1e-3
+
+
+@pytest.mark.parametrize("mean_free_path", [0.3, 4.0, 300.0])
+@pytest.mark.parametrize("memory", [1 << 30, 1 << 20])
+def test_parts_that_touch_share_kernels_and_no_light(library, mean_free_path, memory):
+    """The kernels of a part are cut where no two of its texels are apart, and in a small memory they come in turns."""
+    random, parts = np.random.default_rng(7), [(0, 0, 60, 80), (0, 80, 55, 70), (60, 0, 58, 80), (60, 80, 60, 61)]
+    beams = random.random((120, 150, 3), np.float32)
+    beams[:60, :80] *= 1e4
+    rest = [library] * 3, (0.99, 0.9, 0.6), [mean_free_path, mean_free_path / 3, mean_free_path], (1.0, 0.7)
+    sun = np.array([0.6, 0.0, -0.8], np.float32)
+
+    def solve(values, **options):
+        lights = _native.PlaneLight.of_channels(values, sun, 3)
+        return _native.convolve(lights, *rest, "fft", 1e-3, 0, None, **options)
+
+    together = solve(beams, parts=parts, memory=memory)
+    for y, x, height, width in parts:
+        part = np.s_[y : y + height, x : x + width]
+        alone = solve(np.ascontiguousarray(beams[part]), coarsening=1)
+        assert np.abs(together[part] - alone).max() < 2e-5 * alone.max()
 
 
 def test_a_dark_plane_stays_dark_beside_bright_ones():

@@ -83,6 +83,14 @@ double common_factor(const std::vector<std::vector<double>>& colors, std::size_t
 
 }  // namespace
 
+const PlanePart* part_with(const std::vector<PlanePart>& parts, std::size_t y, std::size_t x)
+{
+    const auto part = std::ranges::find_if(parts, [&](const PlanePart& other) {
+        return y - other.y < other.height && x - other.x < other.width;  // unsigned
+    });
+    return part == parts.end() ? nullptr : &*part;
+}
+
 void validate(const Problem& problem)
 {
     const Plane& plane = problem.plane;

@@ -19,18 +19,28 @@ struct PlanePart {
     std::size_t width = 0;
 };
 
+// The part with a texel; null if none has it.
+const PlanePart* part_with(const std::vector<PlanePart>& parts, std::size_t y, std::size_t x);
+
 // A plane of texels. Texel (0, 0) lies at the origin of the plane frame: x runs along rows, y from row to row, z
-// outward. The plane may consist of rectangular parts with dark gaps between them, which light does not cross.
+// outward. The plane may consist of rectangular parts. Light does not cross the dark gaps between them; without gaps, the
+// solver `fft` keeps it on its part.
 struct Plane {
     std::size_t width = 0;
     std::size_t height = 0;
     double pitch_x = 1.0;  // metres
     double pitch_y = 1.0;
     double extent = 0.0;  // largest distance of two texels of a part, metres; 0: the plane is one part
-    double gap = 0.0;     // least distance of texels of different parts, metres
+    double gap = 0.0;     // least distance of texels of different parts, metres; 0: parts may touch
     std::vector<PlanePart> parts{};  // outside of these no luminance is wanted; empty: the plane is one part
 
     std::size_t texels() const { return width * height; }
+
+    // True if light has to be kept on its part.
+    bool is_divided() const { return !parts.empty() && gap == 0.0; }
+
+    // The part with a texel; null in a gap.
+    const PlanePart* part_of(std::size_t y, std::size_t x) const { return part_with(parts, y, x); }
 };
 
 struct Texel {

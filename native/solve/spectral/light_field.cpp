@@ -8,6 +8,7 @@
 #include "base/threads.h"
 #include "simd/loops.h"
 #include "solve/spectral/convolution.h"
+#include "solve/spectral/part_convolution.h"
 #include "solve/term_choice/choose_terms.h"
 
 namespace beamspread {
@@ -104,8 +105,14 @@ void LightField::solve(Progress& progress, float* luminance)
 
 void LightField::spread(Progress& progress, float* luminance)
 {
-    if (m_terms.terms.empty()) {  // nothing is lit
-        std::fill_n(luminance, m_problem.plane.texels() * m_problem.channels.size(), 0.0f);
+    std::fill_n(luminance, m_problem.plane.texels() * m_problem.channels.size(), 0.0f);
+    if (m_terms.terms.empty())  // nothing is lit
+        return;
+    const auto add = [&](std::size_t result, const RowSpan& span, const float* values, double factor) {
+        add_row(result, span, values, factor, luminance);
+    };
+    if (m_problem.plane.is_divided()) {
+        PartConvolution(m_terms, m_problem.memory).solve(texel_rows(m_terms), add, progress, 1.0);
         return;
     }
     double share = 1.0;  // of the texels in the work
@@ -121,7 +128,7 @@ void LightField::spread(Progress& progress, float* luminance)
     const auto store = [&](std::size_t result, const RowSpan& span, float* values, double factor) {
         if (coarse)
             coarse->grid.add_interpolated(coarse->nodes[result], span, values, m_scratch.local());
-        store_row(result, span, values, factor, luminance);
+        add(result, span, values, factor);
     };
     convolution.solve(texel_rows(m_terms), store, progress, share);
 }
@@ -157,15 +164,15 @@ LightField::CoarseLuminance LightField::spread_coarsely(const Level& level, Prog
     return {grid, std::move(sums)};
 }
 
-void LightField::store_row(std::size_t result, const RowSpan& span, const float* values, double factor,
-                           float* luminance) const
+void LightField::add_row(std::size_t result, const RowSpan& span, const float* values, double factor,
+                         float* luminance) const
 {
     const std::size_t channels = m_problem.channels.size();
     for (const ChannelSets::Member& member : m_terms.sets.results[result].members) {
         const auto scaled = static_cast<float>(factor * inv_pi * member.factor);
         float* out = luminance + (span.y * m_problem.plane.width + span.x) * channels + member.channel;
         for (std::size_t x = 0; x < span.width; ++x)
-            out[x * channels] = scaled * values[x];
+            out[x * channels] += scaled * values[x];
     }
 }
 

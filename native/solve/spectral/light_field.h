@@ -69,7 +69,7 @@ private:
 
     void spread(Progress& progress, float* luminance);
     CoarseLuminance spread_coarsely(const Level& level, Progress& progress, double work);
-    void store_row(std::size_t result, const RowSpan& span, const float* values, double factor, float* luminance) const;
+    void add_row(std::size_t result, const RowSpan& span, const float* values, double factor, float* luminance) const;
 
     Problem m_problem;  // without coming light
     LightTerms m_terms;

@@ -182,10 +182,10 @@ Levels choose_levels(const Plane& plane, const std::vector<ScaledProfile>& profi
     };
     single.centre = {half_width(pitch_x, width), half_width(pitch_y, height)};
     set_halo(single);
-    Tiling best = choose_tiles(single.plane, choice);
+    Tiling best = choice.one_tile ? with_tiles(single.plane, 1, choice) : choose_tiles(single.plane, choice);
     Levels levels{single, std::nullopt, single.ring};
     levels.texels.plane = best.plane;
-    if (!single.ring)
+    if (!single.ring || choice.one_tile)
         return levels;
 
     for (std::size_t coarsening = 4; coarsening <= max_coarsening; coarsening *= 2) {

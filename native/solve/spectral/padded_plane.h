@@ -111,6 +111,7 @@ struct LevelChoice {
     std::size_t terms = 1;       // of the light
     std::size_t media = 1;       // results
     std::size_t coarsening = 0;  // texels between nodes of the coarse grid; 1: no such grid; 0: the cheapest choice
+    bool one_tile = false;       // of texels, without a coarse grid
 };
 
 // Chooses the grids, the smallest padding that keeps light from wrapping around, and the cheapest tiles within the

@@ -40,13 +40,7 @@ public:
     }
 
     // The part with a texel; null in a gap.
-    const PlanePart* part_of(const Texel& texel) const
-    {
-        const auto part = std::ranges::find_if(m_parts, [&](const PlanePart& other) {
-            return texel.y - other.y < other.height && texel.x - other.x < other.width;  // unsigned
-        });
-        return part == m_parts.end() ? nullptr : &*part;
-    }
+    const PlanePart* part_of(const Texel& texel) const { return part_with(m_parts, texel.y, texel.x); }
 
     Texel anywhere()
     {

@@ -63,6 +63,8 @@ RadianceProbe::RadianceProbe(const LightTerms& light, std::vector<std::size_t> l
                                        static_cast<double>(plane.height) * plane.pitch_y));
     if (plane.gap > 0.0)
         reach = std::min(reach, plane.gap);
+    if (plane.is_divided())
+        reach = std::min(reach, plane.extent);
     // The first ring lies inside the texel itself.
     for (double r = 0.5 * std::min(plane.pitch_x, plane.pitch_y); m_radii.empty() || m_radii.back() < reach;
          r *= std::exp2(1.0 / rings_per_octave)) {
@@ -107,6 +109,8 @@ void RadianceProbe::add_rings(const Texel& texel, std::size_t first, std::size_t
 {
     const std::size_t media = m_light.sets.media.size();
     const Plane& plane = m_light.plane;
+    const PlanePart lit =
+        plane.is_divided() ? *plane.part_of(texel.y, texel.x) : PlanePart{.height = plane.height, .width = plane.width};
     Random random(first, texel.y, texel.x);
     AlignedVector<float> cosines(m_harmonics);
     AlignedVector<float> moments(m_light.sets.count() * m_row_size);  // [set]
@@ -124,8 +128,8 @@ void RadianceProbe::add_rings(const Texel& texel, std::size_t first, std::size_t
             const double r = inner + random.uniform() * (m_radii[ring] - inner);
             const double x = static_cast<double>(texel.x) + 0.5 - r * toward_probe.x / plane.pitch_x;
             const double y = static_cast<double>(texel.y) + 0.5 - r * toward_probe.y / plane.pitch_y;
-            if (!(x >= 0.0 && y >= 0.0 && x < static_cast<double>(plane.width) &&
-                  y < static_cast<double>(plane.height)))
+            if (!(x >= static_cast<double>(lit.x) && y >= static_cast<double>(lit.y) &&
+                  x < static_cast<double>(lit.x + lit.width) && y < static_cast<double>(lit.y + lit.height)))
                 continue;
             for (const std::size_t l : m_lights)
                 add_beam(m_light.changing[l], m_light.colors[l],
