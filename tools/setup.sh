@@ -55,14 +55,16 @@ setup: run this as root, then try again:
         apt-get -q install -y --no-install-recommends "${missing[@]}" >&2 || die "these packages could not be installed: ${missing[*]}"
 }
 
-# make_venv REQUIREMENTS...
-# --no-deps: the files list every package, so that nothing replaces Debian's numpy.
 make_venv() {
-    if ! "$venv/bin/python" -c pass 2>/dev/null; then
-        say "making $venv"
-        rm -rf "$venv"
-        "$debian_python" -m venv --system-site-packages "$venv"
-    fi
+    "$venv/bin/python" -c pass 2>/dev/null && return
+    say "making $venv"
+    rm -rf "$venv"
+    "$debian_python" -m venv --system-site-packages "$venv"
+}
+
+# install_into_venv REQUIREMENTS...
+# --no-deps: the files list every package, so that nothing replaces Debian's numpy.
+install_into_venv() {
     say "installing Python packages into $venv"
     local file arguments=()
     for file in "$@"; do arguments+=(-r "$file"); done
@@ -124,11 +126,18 @@ if [ "$(cat build/.setup/$stamp 2>/dev/null)" = "$key" ] && [ -x "$venv/bin/pyth
     { [ "$tests" = 0 ] || [ -f build/numpy-2/.complete ]; }; then
     exit 0
 fi
-make_venv "${requirements[@]}"
+make_venv
+fetched=
 if [ "$tests" = 1 ]; then
-    fetch_into build/bpy-4.5 tools/requirements-bpy.txt "the official Blender module (1 GB)"
-    fetch_into build/numpy-2 tools/requirements-numpy2.txt "numpy 2"
+    # Beside the venv's own packages: unpacking either takes one core.
+    (
+        fetch_into build/bpy-4.5 tools/requirements-bpy.txt "the official Blender module (1 GB)"
+        fetch_into build/numpy-2 tools/requirements-numpy2.txt "numpy 2"
+    ) &
+    fetched=$!
 fi
+install_into_venv "${requirements[@]}"
+[ -z "$fetched" ] || wait "$fetched"
 prepare_other_python
 echo "$key" >build/.setup/$stamp
 say "ready"
