@@ -1,15 +1,18 @@
 """The scenes of blend_examples/ are read whole, and baked."""
 
+from functools import partial
 from pathlib import Path
 
 import bpy
 import pytest
+from beamspread.blender.cycles import cycles_light
 from beamspread.blender.jobs.run.bake_plan import read_scene
 from beamspread.blender.jobs.run.batch_run import bake_all
 from beamspread.blender.node.find import find_bakeable
 from beamspread.blender.node.uv_maps import objects_with_maps
 from beamspread.blender.read.geometry import OWN_MAP
 from beamspread.blender.read.lights import read_illumination
+from beamspread.core.bake.bounced import BouncedLight
 from beamspread.core.batch.batch_options import parse
 
 FOLDER = Path(__file__).resolve().parents[2] / "blend_examples"
@@ -62,13 +65,15 @@ def test_objects_without_a_fitting_map_get_one(name):
 
 
 @pytest.mark.parametrize("name", KINDS)
-def test_all_are_baked(name, tmp_path):
+def test_all_are_baked(name, tmp_path, monkeypatch):
+    # Coarse bounced light is enough here, and takes a fraction of the time.
+    monkeypatch.setattr(cycles_light, "BouncedLight", partial(BouncedLight, tolerance=0.1))
     # Bounced light takes long: Cycles would find that of the marble floor, and the planks lie in a room. Only Cycles
     # could find that of the bowl's flame, and not on a mesh that bends.
     arguments = ["--no-indirect"] if name in ("marble_floor", "plank_floor", "jade_bowl") else []
     bpy.ops.wm.open_mainfile(filepath=str(FOLDER / f"{name}.blend"))
     bpy.context.scene.beamspread.quality = "preview"
-    report = bake_all(parse([*arguments, "--resolution", "64", "--output", str(tmp_path)]))
+    report = bake_all(parse([*arguments, "--resolution", "32", "--output", str(tmp_path)]))
     assert report.bakes
     assert {bake.status for bake in report.bakes} == {"written"}
     assert not any(bake.dark or bake.left_out for bake in report.bakes)
