@@ -15,7 +15,7 @@ from beamspread.core.scene.islands import check_map
 from live_scenes import live_lines, live_pixels, settle, switch_off
 from nodes import Nodes
 
-SIDE = 128
+SIDE = 64
 
 MODIFIER = "Beamspread UV Map"
 
