@@ -131,7 +131,7 @@ fi
 step "the zip" cmake --build build/release --target package
 # Two runs at a time, because tests in a Blender use one core most of the time. The output of the second run comes at
 # its end; it gets some of Blender's tests, so that both take about as long.
-moved=(tests/blender/test_read_world.py)
+moved=(tests/blender/test_batch.py tests/blender/test_curves.py tests/blender/test_read_world.py)
 beside=$(mktemp)
 {
     step "tests" in_venv
