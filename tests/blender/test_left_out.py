@@ -41,10 +41,26 @@ def add_metaball():
     return ball
 
 
+def add_volume():
+    smoke = bpy.data.objects.new("Smoke", bpy.data.volumes.new("Smoke"))
+    smoke.data.materials.append(scenes.add_material())
+    bpy.context.scene.collection.objects.link(smoke)
+    return smoke
+
+
+def add_hair():
+    hair = bpy.data.objects.new("Fur", bpy.data.hair_curves.new("Fur"))
+    hair.data.materials.append(scenes.add_material())
+    bpy.context.scene.collection.objects.link(hair)
+    return hair
+
+
 MISPLACED = [
     (add_grouped, "Grouped", ["'Grouped' has one image, but its node group 'Outer'", "Ctrl Alt G"]),
     (add_instances, "Shown", ["'Shown' has 2 instances", "Make Instances Real", "Make Single User"]),
     (add_metaball, "Ball", ["'Ball' is not a mesh", "Convert"]),
+    (add_volume, "Smoke", ["'Smoke' is a volume, which has no faces. Give the node to a mesh."]),
+    (add_hair, "Fur", ["'Fur' is hair, which has no faces. Give the node to a mesh."]),
 ]
 
 

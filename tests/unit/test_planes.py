@@ -156,6 +156,21 @@ def test_overlapping_islands_are_refused():
         build_receiver(flatten(mesh_of(box(), [SQUARE] * 6)), 32, 32)
 
 
+def test_faces_without_area_are_named_with_a_remedy_that_works():
+    flat = [np.array([(x, 0, 0), (x + 1, 0, 0), (x + 0.5, 0, 0)], float) for x in range(3)]
+    uvs = [SQUARE[:3] / 3 + (number / 3, 0) for number in range(3)]
+    with pytest.raises(ReceiverError, match=r"corners of faces 0 to 2 lie on a line.*move the corners apart"):
+        flatten(mesh_of(flat, uvs))
+    apart = [face + np.outer(np.arange(3) == 2, (0, 1, 0)) for face in flat]
+    assert len(flatten(mesh_of(apart, uvs)).parts) == 3
+
+
+def test_faces_without_area_in_the_map_are_named():
+    uvs = [np.full((4, 2), 0.9) if face in (2, 5) else square for face, square in enumerate(atlas(6))]
+    with pytest.raises(ReceiverError, match=r"no area in faces 2 and 5 \(2 of 6 faces\)"):
+        islands.check_map(mesh_of(box(), uvs))
+
+
 def test_a_plane_without_area_in_the_map_stays_black_and_is_named():
     mesh = flatten(mesh_of(box(), [*atlas(5), np.full((4, 2), 0.9)]), name="Box")
     assert len(mesh.parts) == 5

@@ -13,7 +13,7 @@ from ...core.errors import BakeError
 from ...core.target import FRONT, Target
 from .. import compat
 from ..read.nodes import InputSocket
-from ..read.visibility import RECEIVER_TYPES, count_instances, render_visible_names, with_instanced
+from ..read.visibility import RECEIVER_TYPES, UNKNOWN_TYPES, count_instances, render_visible_names, with_instanced
 from .node import BeamspreadNode, image_of_side
 from .output import is_linked
 
@@ -172,10 +172,16 @@ def _misplaced(obj, with_images: bool) -> Iterator[tuple]:
         node = find_node(material)
         is_wanted = node is not None and (not any(node.shown_images()) or (with_images and material.library is None))
         if is_wanted and obj.type not in RECEIVER_TYPES:
-            yield material, BakeError(f"'{obj.name}' is not a mesh.", "Convert it to one (Object > Convert > Mesh).")
+            yield material, _error_of_type(obj)
         if node is None and compat.uses_nodes(material):
             for _, groups in _nodes_in(material.node_tree):
                 yield material, _error_of_group(material, groups)
+
+
+def _error_of_type(obj) -> BakeError:
+    if obj.type in UNKNOWN_TYPES:
+        return BakeError(f"'{obj.name}' is {UNKNOWN_TYPES[obj.type]}, which has no faces.", "Give the node to a mesh.")
+    return BakeError(f"'{obj.name}' is not a mesh.", "Convert it to one (Object > Convert > Mesh).")
 
 
 def _all_materials(obj) -> list:

@@ -77,7 +77,9 @@ def find_planes(polygons: Polygons, tolerance: float) -> tuple[list[Plane], np.n
         No face has an area.
     """
     if polygons.areas.max() <= NO_AREA * polygons.diagonal**2:
-        raise ReceiverError("The faces have no area.", "Check the object's scale.")
+        listed = polygons.listed(np.ones(polygons.count, bool))
+        text = f"The corners of {listed} lie on a line: no face has an area."
+        raise ReceiverError(text, "Check the object's scale and modifiers, or move the corners apart.")
     return _Search(polygons, tolerance).run()
 
 
