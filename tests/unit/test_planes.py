@@ -167,7 +167,7 @@ def test_faces_without_area_are_named_with_a_remedy_that_works():
 
 def test_faces_without_area_in_the_map_are_named():
     uvs = [np.full((4, 2), 0.9) if face in (2, 5) else square for face, square in enumerate(atlas(6))]
-    with pytest.raises(ReceiverError, match=r"no area in faces 2 and 5 \(2 of 6 faces\)"):
+    with pytest.raises(ReceiverError, match="no area in 2 of 6 faces: faces 2 and 5"):
         islands.check_map(mesh_of(box(), uvs))
 
 

@@ -81,7 +81,8 @@ def check_map(polygons: Polygons) -> None:
     sizes = polygons.uv_areas
     is_lost = (sizes <= NO_UV_AREA) & (polygons.areas > 0)
     if polygons.areas[is_lost].sum() > MAX_LOST * polygons.areas.sum():
-        text = f"The UV map has no area in {polygons.listed(is_lost)} ({is_lost.sum()} of {polygons.count} faces)."
+        listed = "" if is_lost.all() else f": {polygons.listed(is_lost)}"
+        text = f"The UV map has no area in {is_lost.sum()} of {polygons.count} faces{listed}."
         raise ReceiverError(text, "Unwrap the mesh again.")
     # A small map fills few texels of the probe.
     shown = sum(map(_shown, polygons.by_tile().values()))
