@@ -1,6 +1,6 @@
 """Cost of many planes in one image, relative to one plane with as many texels: planks under each kind of light.
 
-Usage: tests/bench/run.sh planes, or python planes.py [SIDE] [PLANKS].
+Usage: tests/bench/run.sh planes, or python planes.py [SIDE] [PLANKS] [MEAN FREE PATHS, texels ...].
 """
 
 import math
@@ -53,9 +53,9 @@ def seconds(count: int, side: int, names: tuple[str, ...], mean_free_path: float
     return time.process_time() - start
 
 
-def main(side: int = 2048, count: int = 484) -> None:
+def main(side: int = 2048, count: int = 484, *paths: float) -> None:
     seconds(1, 64, ("sun",), 0.01)  # reads the library
-    for path in (0.2, 1.0):
+    for path in paths or (0.2, 1.0):
         for names in (("sun",), ("lamp",), ("area",), ("area", "world")):
             alone, many = (seconds(number, side, names, path / side) for number in (1, count))
             print(
@@ -64,4 +64,4 @@ def main(side: int = 2048, count: int = 484) -> None:
 
 
 if __name__ == "__main__":
-    main(*map(int, sys.argv[1:]))
+    main(*map(int, sys.argv[1:3]), *map(float, sys.argv[3:]))
