@@ -71,7 +71,7 @@ void bake_canvas(const Canvas& canvas, const std::vector<CanvasLight>& lights, c
     if (options.solver != Solver::fft || (all_have_one && fits))
         bake_stored(canvas, lights, options, std::move(problem), progress, luminance);
     else
-        bake_by_field(canvas, lights, options, std::move(problem), progress, luminance);
+        bake_by_field(canvas, lights, options, problem, progress, luminance);
     progress.finish();
 }
 

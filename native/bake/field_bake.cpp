@@ -8,6 +8,7 @@
 #include <utility>
 
 #include "base/constants.h"
+#include "simd/loops.h"
 
 namespace beamspread {
 
@@ -121,13 +122,34 @@ public:
     {
     }
 
-    void run(Problem problem, Progress& progress, float* luminance)
+    void run(const Problem& problem, Progress& progress, float* luminance)
     {
-        survey(problem.coming);
-        sort_lights();
+        survey();
+        group_lights();
         set_total(progress);
+        const std::size_t values = problem.plane.texels() * problem.channels.size();
+        std::fill_n(luminance, values, 0.0f);
+        std::vector<float> part_of_sum;  // luminance of a group beside the first
+        for (const Group& group : m_groups) {
+            const bool is_first = &group == &m_groups.front();
+            part_of_sum.resize(is_first ? 0 : values);
+            run(group, problem, progress, is_first ? luminance : part_of_sum.data());
+            add_scaled(luminance, part_of_sum.data(), 1.0f, part_of_sum.size());
+        }
+    }
+
+private:
+    // Lights that share a field, the brightest first.
+    struct Group {
+        std::vector<std::size_t> suns;      // kept, each with a kernel of its own
+        std::vector<std::size_t> later;     // added as rays or moments
+        std::vector<std::size_t> examples;  // those of them for which terms are chosen
+    };
+
+    void run(const Group& group, Problem problem, Progress& progress, float* luminance)
+    {
         StoredLight kept;
-        for (const std::size_t i : m_suns)
+        for (const std::size_t i : group.suns)
             progress.advance_by(light_work, [&](Progress& part) {
                 kept.add_one_direction(m_canvas, m_lights[i], m_options.ray_settings(m_options.rays), part);
             });
@@ -138,40 +160,48 @@ public:
             // The mean direction of each texel: harmonics of all its directions together are weaker.
             RaySettings few = m_options.ray_settings(example_rays);
             few.noise = nullptr;
-            for (const std::size_t i : m_examples)
+            for (const std::size_t i : group.examples)
                 progress.advance_by(
                     light_work, [&](Progress& part) { examples.add_mean_direction(m_canvas, m_lights[i], few, part); });
             problem.coming.examples = examples.lights;
             problem.coming.irradiance = m_mean;
-            for (const std::size_t i : m_later)
-                if (m_lights[i].is_smooth())
-                    problem.coming.smooth.push_back(m_lights[i].smooth_light());
-            if (problem.lights.empty() && examples.lights.empty() && m_mean == 0.0) {
-                std::fill_n(luminance, problem.plane.texels() * problem.channels.size(), 0.0f);
+            double mean = 0.0;
+            for (const auto* lights : {&group.suns, &group.later})
+                for (const std::size_t i : *lights) {
+                    mean += m_means[i];
+                    std::ranges::copy(m_surveys[i].lights, std::back_inserter(problem.coming.survey));
+                    if (m_lights[i].is_smooth())
+                        problem.coming.smooth.push_back(m_lights[i].smooth_light());
+                }
+            if (problem.lights.empty() && examples.lights.empty() && mean == 0.0)
                 return;
-            }
             progress.advance_by(solver_work,
                                 [&](Progress& part) { field = std::make_unique<LightField>(problem, part); });
         }
-        m_surveys.clear();
-        for (const std::size_t i : m_later)
+        for (const std::size_t i : group.later)
             progress.advance_by(gather_work(i),
                                 [&](Progress& part) { add_light(m_lights[i], settings_for(i), *field, part); });
         progress.advance_by(solver_work, [&](Progress& part) { field->solve(part, luminance); });
     }
 
-private:
+    // A light where nothing blocks it, at few texels of each patch.
+    struct Survey {
+        std::list<StoredLight> stored;
+        std::vector<SurveyedLight> lights;  // parts of these
+    };
+
     // Finds the angles, colors and mean irradiance of lights where nothing blocks them.
-    void survey(ComingLight& coming)
+    void survey()
     {
+        m_surveys.resize(m_lights.size());
         m_means.assign(m_lights.size(), 0.0);
         m_patch_means.assign(m_lights.size(), std::vector<double>(m_canvas.patches.size()));
         for (std::size_t i = 0; i < m_canvas.patches.size(); ++i)
-            survey(i, coming);
+            survey(i);
         m_mean = std::accumulate(m_means.begin(), m_means.end(), 0.0);
     }
 
-    void survey(std::size_t i, ComingLight& coming)
+    void survey(std::size_t i)
     {
         const Patch& patch = m_canvas.patches[i];
         const double share = m_canvas.share(patch);
@@ -192,7 +222,7 @@ private:
             SurfaceLight open = *light;
             open.occluders = nullptr;
             const CanvasLight on_patch(alone, {&open});
-            StoredLight& stored = m_surveys.emplace_back();
+            StoredLight& stored = m_surveys[l].stored.emplace_back();
             if (open.directions(coarse.grid) && !open.field)
                 stored.add_one_direction(alone, on_patch, settings, unseen);
             else
@@ -200,29 +230,37 @@ private:
             m_patch_means[l][i] = stored.mean();
             m_means[l] += share * m_patch_means[l][i];
             for (const PlaneLight& part : light->is_colored(*patch.surface) ? by_channel(stored.lights) : stored.lights)
-                coming.survey.push_back({coarse.plane(), texels_each, part});
+                m_surveys[l].lights.push_back({coarse.plane(), texels_each, part});
         }
     }
 
-    // Decides which lights are kept as suns, which are added as rays or moments, and which of these are examples.
-    void sort_lights()
+    // Decides which lights share a field. Smooth light has one of its own beside others: its angles fill the hemisphere and
+    // its channels differ, so that it would add terms of all angles and channels to a lamp that needs few.
+    void group_lights()
     {
         std::vector<std::size_t> brightest(m_lights.size());
         std::iota(brightest.begin(), brightest.end(), std::size_t{0});
         std::ranges::stable_sort(brightest, std::greater{}, [&](std::size_t i) { return m_means[i]; });
-        std::ranges::copy_if(brightest, std::back_inserter(m_suns), [&](std::size_t i) {
+        Group others;
+        Group smooth;
+        std::ranges::copy_if(brightest, std::back_inserter(others.suns), [&](std::size_t i) {
             const auto directions = m_lights[i].is_field() ? std::nullopt : m_lights[i].directions();
             return directions && std::holds_alternative<OneDirection>(*directions);
         });
-        if (m_suns.size() > max_suns)
-            m_suns.clear();
+        if (others.suns.size() > max_suns)
+            others.suns.clear();
         for (const std::size_t i : brightest)
-            if (std::ranges::find(m_suns, i) == m_suns.end())
-                m_later.push_back(i);
+            if (std::ranges::find(others.suns, i) == others.suns.end())
+                (m_lights[i].is_smooth() ? smooth : others).later.push_back(i);
         // A light that the survey missed shines on few texels.
-        for (std::size_t k = 0; k < m_later.size(); ++k)
-            if (!m_lights[m_later[k]].is_smooth() && (k < max_examples || m_means[m_later[k]] == 0.0))
-                m_examples.push_back(m_later[k]);
+        for (std::size_t k = 0; k < others.later.size(); ++k)
+            if (k < max_examples || m_means[others.later[k]] == 0.0)
+                others.examples.push_back(others.later[k]);
+        if (others.later.empty())
+            others.later = std::exchange(smooth.later, {});
+        m_groups.push_back(std::move(others));
+        if (!smooth.later.empty())
+            m_groups.push_back(std::move(smooth));
     }
 
     // Rays of a light from each texel of each patch: lights share them by their mean irradiance there.
@@ -249,28 +287,31 @@ private:
 
     void set_total(Progress& progress) const
     {
-        double total = light_work * static_cast<double>(m_suns.size() + m_examples.size()) + 2.0 * solver_work;
-        for (const std::size_t i : m_later)
-            total += gather_work(i);
+        double total = 0.0;
+        for (const Group& group : m_groups) {
+            total += light_work * static_cast<double>(group.suns.size() + group.examples.size()) + 2.0 * solver_work;
+            for (const std::size_t i : group.later)
+                total += gather_work(i);
+        }
         progress.set_total(total);
     }
 
     const Canvas& m_canvas;
     const std::vector<CanvasLight>& m_lights;
     const BakeOptions& m_options;
-    std::list<StoredLight> m_surveys;
-    std::vector<double> m_means;  // [light] mean irradiance of the survey, W/m^2
+    std::vector<Survey> m_surveys;  // [light]
+    std::vector<double> m_means;    // [light] mean irradiance of the survey, W/m^2
     std::vector<std::vector<double>> m_patch_means;  // [light][patch]
-    double m_mean = 0.0;                // sum of these
-    std::vector<std::size_t> m_suns, m_later, m_examples;  // lights, the brightest first
+    double m_mean = 0.0;                             // sum of these
+    std::vector<Group> m_groups;
 };
 
 }  // namespace
 
 void bake_by_field(const Canvas& canvas, const std::vector<CanvasLight>& lights, const BakeOptions& options,
-                   Problem problem, Progress& progress, float* luminance)
+                   const Problem& problem, Progress& progress, float* luminance)
 {
-    FieldBake(canvas, lights, options).run(std::move(problem), progress, luminance);
+    FieldBake(canvas, lights, options).run(problem, progress, luminance);
 }
 
 void bake_luminance(const Surface& surface, const std::vector<SurfaceLight>& lights, LightField& field,

@@ -16,6 +16,6 @@ inline constexpr double solver_work = 3.0;
 
 // Writes the luminance of a canvas without the color of light that leaves its surfaces. `problem` has no lights yet.
 void bake_by_field(const Canvas& canvas, const std::vector<CanvasLight>& lights, const BakeOptions& options,
-                   Problem problem, Progress& progress, float* luminance);
+                   const Problem& problem, Progress& progress, float* luminance);
 
 }  // namespace beamspread

@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "base/error.h"
+#include "base/threads.h"
 
 namespace beamspread {
 
@@ -113,6 +114,28 @@ void check_memory(const Problem& problem, std::size_t bytes)
 
 }  // namespace
 
+MomentPlanes::MomentPlanes(const std::vector<LightTerm>& terms, std::size_t texels,
+                           const std::function<void()>& advance)
+    : m_texels(texels)
+{
+    const auto count = static_cast<std::size_t>(std::ranges::count_if(terms, &LightTerm::is_moment));
+    m_data.reset(HugePageAllocator<float>().allocate(std::max<std::size_t>(count * texels, 1)));
+    float* next = m_data.get();
+    for (const LightTerm& term : terms)
+        m_planes.push_back(term.is_moment() ? std::exchange(next, next + texels) : nullptr);
+    clear(advance);
+}
+
+void MomentPlanes::clear(const std::function<void()>& advance)
+{
+    parallel_for(m_planes.size(), [&](std::size_t term) {
+        if (m_planes[term])
+            std::fill_n(m_planes[term], m_texels, 0.0f);
+        if (advance)
+            advance();
+    });
+}
+
 LightTerms light_terms(const Problem& problem, double beyond, const TermChoice& choose)
 {
     LightTerms result{problem.plane, ChannelSets(problem), {}, {}, {}, {}, {}, {}, {}};
@@ -145,8 +168,7 @@ LightTerms light_terms(const Problem& problem, double beyond, const TermChoice& 
     add_basis(result, kernels.basis(choose(kernels, incidence, result), beyond));
     drop_examples();
     if (!problem.coming.survey.empty()) {
-        const auto moments = std::count_if(result.terms.begin(), result.terms.end(),
-                                           [](const LightTerm& term) { return term.fixed.empty(); });
+        const auto moments = std::ranges::count_if(result.terms, &LightTerm::is_moment);
         check_memory(problem, static_cast<std::size_t>(moments) * problem.plane.texels() * sizeof(float));
     }
     return result;

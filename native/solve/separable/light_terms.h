@@ -5,9 +5,11 @@
 #include <cstddef>
 #include <cstdint>
 #include <functional>
+#include <memory>
 #include <span>
 #include <vector>
 
+#include "base/platform.h"
 #include "solve/problem/problem.h"
 #include "solve/separable/low_rank.h"
 
@@ -25,6 +27,34 @@ struct LightTerm {
     Phase phase = Phase::cosine;
     std::size_t set = 0;
     std::vector<std::vector<KernelTerm>> kernels;  // [result], sorted, see `KernelSpectra::parts`; empty: none
+
+    bool is_moment() const { return fixed.empty(); }
+};
+
+// Light that is added to terms, [term][texel]. All planes share one block of memory, in huge pages: the first touch of pages
+// of 4 KB, on one thread, took a quarter of a bake under a sky.
+class MomentPlanes {
+public:
+    // No plane.
+    MomentPlanes() = default;
+
+    // Planes of zeros for the terms that are moments; the others have none. Calls `advance` now and then, from any thread.
+    MomentPlanes(const std::vector<LightTerm>& terms, std::size_t texels, const std::function<void()>& advance);
+
+    void clear(const std::function<void()>& advance = {});
+
+    // Null if the term has no plane.
+    float* plane(std::size_t term) { return m_planes.empty() ? nullptr : m_planes[term]; }
+    const float* plane(std::size_t term) const { return m_planes.empty() ? nullptr : m_planes[term]; }
+
+private:
+    struct Free {
+        void operator()(float* memory) const { HugePageAllocator<float>().deallocate(memory, 0); }
+    };
+
+    std::size_t m_texels = 0;
+    std::unique_ptr<float, Free> m_data;
+    std::vector<float*> m_planes;  // [term]
 };
 
 // All terms. Lights of few directions have one term per direction, with all harmonics. All other lights, of any number,
@@ -38,7 +68,7 @@ struct LightTerms {
     LowRankBasis basis;                      // of `changing`
     std::vector<LightTerm> terms;
     std::vector<ScaledProfile> profiles;
-    std::vector<std::vector<float>> moments;  // [term][texel] of added light; empty for fixed terms and without it
+    MomentPlanes moments;  // of added light
 };
 
 // Chooses the terms of a decomposition that lights of changing directions need.

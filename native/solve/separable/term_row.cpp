@@ -90,14 +90,14 @@ void TermRow::start(const LightTerms& terms, const RowSpan& span, std::size_t fi
     bool has_moments = false;
     for (std::size_t t = first; t < first + count; ++t) {
         float* row = m_values.data() + (t - first) * m_width;
-        has_moments |= terms.terms[t].fixed.empty();
+        has_moments |= terms.terms[t].is_moment();
         for (const auto& [light, weight] : terms.terms[t].fixed) {
             m_light.resize(span.width);
             copy_row(terms.fixed[light].irradiance, span.y, span.x, span.width, m_light.data());
             add_scaled(row, m_light.data(), weight, span.width);
         }
-        if (!terms.moments.empty() && !terms.moments[t].empty())
-            std::copy_n(terms.moments[t].data() + span.y * terms.plane.width + span.x, span.width, row);
+        if (const float* added = terms.moments.plane(t))
+            std::copy_n(added + span.y * terms.plane.width + span.x, span.width, row);
     }
     if (!has_moments)
         return;
@@ -144,7 +144,7 @@ void MomentSum::add_beams(LightTerms& terms, const RowSpan& span, const float* i
 {
     const std::size_t first = span.y * terms.plane.width + span.x;
     m_moments.add(
-        terms, m_beams, m_colors, 0, terms.terms.size(), [&](std::size_t t) { return terms.moments[t].data() + first; },
+        terms, m_beams, m_colors, 0, terms.terms.size(), [&](std::size_t t) { return terms.moments.plane(t) + first; },
         irradiance);
 }
 

@@ -43,13 +43,9 @@ LightTerms chosen_terms(const Problem& problem, Progress& progress)
     with_threads(problem.threads, [&] {
         validate(problem);
         result = light_terms(problem, std::min(1e-2 * problem.tolerance, max_beyond), choose);
+        if (!problem.coming.survey.empty())  // zeros of large planes take long enough to cancel
+            result->moments = MomentPlanes(result->terms, problem.plane.texels(), [&] { progress.advance(0.0); });
     });
-    for (const LightTerm& term : result->terms) {
-        if (problem.coming.survey.empty())
-            break;
-        progress.advance(0.0);  // zeros of large planes take seconds
-        result->moments.emplace_back(term.fixed.empty() ? problem.plane.texels() : 0);
-    }
     return *std::move(result);
 }
 
@@ -80,14 +76,13 @@ std::vector<float> LightField::moment_factors(std::span<const Vec3f> travel, con
 
 void LightField::add_moments(std::size_t term, const RowSpan& span, const float* factors, const float* values)
 {
-    float* sums = m_terms.moments[term].data() + span.y * m_problem.plane.width + span.x;
+    float* sums = m_terms.moments.plane(term) + span.y * m_problem.plane.width + span.x;
     add_scaled_product(sums, factors, values, 1.0f, span.width);
 }
 
 void LightField::clear()
 {
-    for (std::vector<float>& moments : m_terms.moments)
-        std::fill(moments.begin(), moments.end(), 0.0f);
+    with_threads(m_problem.threads, [&] { m_terms.moments.clear(); });
     if (m_unscattered)
         m_unscattered->clear();
 }
