@@ -164,7 +164,6 @@ private:
                 progress.advance_by(
                     light_work, [&](Progress& part) { examples.add_mean_direction(m_canvas, m_lights[i], few, part); });
             problem.coming.examples = examples.lights;
-            problem.coming.irradiance = m_mean;
             double mean = 0.0;
             for (const auto* lights : {&group.suns, &group.later})
                 for (const std::size_t i : *lights) {
@@ -173,6 +172,8 @@ private:
                     if (m_lights[i].is_smooth())
                         problem.coming.smooth.push_back(m_lights[i].smooth_light());
                 }
+            // Smooth light is alone in the shadows of others, where its errors count against it and not against all.
+            problem.coming.irradiance = std::sqrt(mean * m_mean);
             if (problem.lights.empty() && examples.lights.empty() && mean == 0.0)
                 return;
             progress.advance_by(solver_work,

@@ -147,7 +147,7 @@ struct ComingLight {
     // Some of that light, which needs terms besides.
     std::vector<SmoothLight> smooth;
 
-    double irradiance = 0.0;  // mean of all light, over texels and channels, W/m^2
+    double irradiance = 0.0;  // mean over texels and channels that errors of smooth light count against, W/m^2
 };
 
 enum class Solver { fft, direct, adaptive };
