@@ -36,7 +36,7 @@ endif()
 function(beamspread_keep_apart target)
   if(linux)
     target_link_options(${target} PRIVATE -Wl,--version-script=${CMAKE_SOURCE_DIR}/cmake/linux/exports.map
-                        -Wl,--exclude-libs,ALL -Wl,--gc-sections $<$<CONFIG:Release>:>)
+                        -Wl,--exclude-libs,ALL -Wl,--gc-sections $<$<CONFIG:Release>:-Wl,--strip-all>)
     set_target_properties(${target} PROPERTIES LINK_DEPENDS ${CMAKE_SOURCE_DIR}/cmake/linux/exports.map)
     if(NOT BEAMSPREAD_SANITIZE)  # a sanitizer's run time looks for the functions of a shared libstdc++
       # libgcc_s stays the system's: GCC 12's static one needs glibc 2.35.
