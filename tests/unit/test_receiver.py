@@ -185,8 +185,11 @@ def replaced(**changes):
         (replaced(uvs=SQUARE * [1, 0]), "no area"),
         (replaced(uvs=np.zeros((4, 2))), "no area"),
         (replaced(uvs=SQUARE * np.nan), "not numbers"),
-        (replaced(corners=np.zeros((4, 3))), "no area"),
-        (replaced(corners=np.array([[0, 0, 0], [1, 0, 0], [2, 0, 0], [3.0, 0, 0]])), "no area"),
+        (replaced(corners=np.zeros((4, 3))), "The corners of face 0 lie on a line: no face has an area"),
+        (
+            replaced(corners=np.array([[0, 0, 0], [1, 0, 0], [2, 0, 0], [3.0, 0, 0]])),
+            "The corners of face 0 lie on a line: no face has an area",
+        ),
         (replaced(corners=np.full((4, 3), np.inf)), "The positions of face 0 are infinite"),
         (replaced(starts=np.array([0]), corners=np.zeros((0, 3)), normals=np.zeros((0, 3))), "No face"),
     ],

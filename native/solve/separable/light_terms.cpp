@@ -16,6 +16,9 @@ namespace {
 // Largest number of directions with a term each. Larger: less time for few directions, more for many.
 constexpr std::size_t max_fixed_directions = 16;
 
+// Texels that planes of moments are moved apart by: rays are added to about as many at once.
+constexpr std::size_t texels_apart = 64;
+
 // All harmonics of a kernel for beams that travel toward azimuth beta.
 std::vector<KernelTerm> fixed_kernel(std::size_t profile, std::size_t harmonics, double beta, double factor)
 {
@@ -119,10 +122,12 @@ MomentPlanes::MomentPlanes(const std::vector<LightTerm>& terms, std::size_t texe
     : m_texels(texels)
 {
     const auto count = static_cast<std::size_t>(std::ranges::count_if(terms, &LightTerm::is_moment));
-    m_data.reset(HugePageAllocator<float>().allocate(std::max<std::size_t>(count * texels, 1)));
+    // Planes a power of two apart would share few lines of the cache.
+    const std::size_t stride = (texels + texels_apart - 1) / texels_apart * texels_apart + texels_apart;
+    m_data.reset(HugePageAllocator<float>().allocate(std::max<std::size_t>(count * stride, 1)));
     float* next = m_data.get();
     for (const LightTerm& term : terms)
-        m_planes.push_back(term.is_moment() ? std::exchange(next, next + texels) : nullptr);
+        m_planes.push_back(term.is_moment() ? std::exchange(next, next + stride) : nullptr);
     clear(advance);
 }
 
