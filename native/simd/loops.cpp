@@ -314,12 +314,13 @@ BEAMSPREAD_DISPATCH(scatter_bits,
 #undef BEAMSPREAD_DISPATCH
 
 // Not vectorized: one load of a pair is faster than a gather.
-void look_up(float* __restrict result, const TableStep* table, const std::uint32_t* step, const float* part,
-             std::size_t count)
+void look_up(float* __restrict result, std::size_t functions, const TableStep* table, std::size_t stride,
+             const std::uint32_t* step, const float* part, std::size_t count)
 {
     for (std::size_t i = 0; i < count; ++i) {
-        const TableStep& at = table[step[i]];
-        result[i] = at.value + part[i] * at.rise;
+        const TableStep* const row = table + step[i] * stride;
+        for (std::size_t f = 0; f < functions; ++f)
+            result[f * count + i] = row[f].value + part[i] * row[f].rise;
     }
 }
 

@@ -49,8 +49,9 @@ struct TableStep {
     float rise;
 };
 
-// result[i] = the table, interpolated between step[i] and step[i] + 1
-void look_up(float* result, const TableStep* table, const std::uint32_t* step, const float* part, std::size_t count);
+// result[f * count + i] = function f, interpolated between step[i] and step[i] + 1. Rows of the table are `stride` apart.
+void look_up(float* result, std::size_t functions, const TableStep* table, std::size_t stride,
+             const std::uint32_t* step, const float* part, std::size_t count);
 
 // Harmonics in a block: loops over blocks have no remainders.
 inline constexpr std::size_t harmonics_per_block = 8;

@@ -90,7 +90,7 @@ void add_basis(LightTerms& terms, LowRankBasis basis)
         terms.profiles.insert(terms.profiles.end(), profiles.begin(), profiles.end());
     }
     for (std::size_t f = 0; f < terms.basis.functions.size(); ++f) {
-        const auto& [m, rank, values] = terms.basis.functions[f];
+        const auto& [m, rank] = terms.basis.functions[f];
         for (const Phase phase : {Phase::cosine, Phase::sine})
             for (std::size_t set = 0; set < terms.sets.count() && (m > 0 || phase == Phase::cosine); ++set) {
                 LightTerm term{{}, f, phase, set, {}};

@@ -96,7 +96,7 @@ private:
     std::vector<float> m_part;
     std::vector<float> m_cosine;  // cos(m beta), sin(m beta), times irradiance if all sets share it
     std::vector<float> m_sine;
-    std::vector<float> m_u;
+    std::vector<float> m_u;  // [function][beam]
     std::vector<float> m_product;
 };
 

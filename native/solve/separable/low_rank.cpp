@@ -237,6 +237,8 @@ LowRankBasis KernelDecomposition::basis(const std::vector<std::size_t>& chosen, 
     std::vector<std::vector<std::vector<Harmonics>>> weights;
     for (const AngularMedium& medium : m_angular->media)
         weights.emplace_back(ranks, std::vector<Harmonics>(medium.nodes.size()));
+    basis.steps = table_steps;
+    basis.table.resize((table_steps + 1) * chosen.size());
     for (const std::size_t t : chosen) {
         const auto& [m, rank, gain] = m_terms[t];
         // Compute the right factor of the decomposition; gains are means over the media.
@@ -252,13 +254,12 @@ LowRankBasis KernelDecomposition::basis(const std::vector<std::size_t>& chosen, 
             const NodeWeights& table = m_angular->tables.at({m_media[k].ldf, m_media[k].side});
             values += table.interpolated(m, medium.nodes, features * (features.transpose() * by_node));
         }
-        LowRankBasis::AngleFunction function{m, rank, {}};
-        for (Eigen::Index i = 0; i < values.size(); ++i) {
-            const auto here = static_cast<float>(values[i]);
-            const auto next = static_cast<float>(values[std::min(i + 1, values.size() - 1)]);
-            function.values.push_back({here, next - here});
+        for (std::size_t i = 0; i <= table_steps; ++i) {
+            const auto here = static_cast<float>(values[index(i)]);
+            const auto next = static_cast<float>(values[index(std::min(i + 1, table_steps))]);
+            basis.table[i * chosen.size() + basis.functions.size()] = {here, next - here};
         }
-        basis.functions.push_back(std::move(function));
+        basis.functions.push_back({m, rank});
     }
     parallel_for(m_media.size() * ranks, [&](std::size_t item) {
         const std::size_t k = item / ranks;

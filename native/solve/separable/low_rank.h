@@ -72,11 +72,14 @@ struct LowRankBasis {
     struct AngleFunction {
         std::size_t m;
         std::size_t rank;
-        std::vector<TableStep> values;
     };
     double first = 0.0;  // tan(theta / 2) of the tables' first and last entries
     double last = 0.0;
     std::vector<AngleFunction> functions;              // ascending m, then rank
+    // [step][function]: a beam reads all functions of its step, one after the other. Tables of one function each leave the
+    // processor's cache, and a sky takes a third longer.
+    std::vector<TableStep> table;
+    std::size_t steps = 0;
     std::vector<std::vector<ScaledProfile>> profiles;  // [medium][rank]
 };
 

@@ -28,35 +28,43 @@ void BeamMoments::add(const LightTerms& terms, const BeamRow& beams, const std::
     if (first == end || terms.basis.functions.empty())  // the medium is black
         return;
     const std::size_t count = beams.irradiance.size();
+    std::size_t first_function = terms.basis.functions.size();
+    std::size_t end_function = 0;
+    for (std::size_t t = first; t < end; ++t)
+        if (terms.terms[t].is_moment()) {
+            first_function = std::min(first_function, terms.terms[t].function);
+            end_function = std::max(end_function, terms.terms[t].function + 1);
+        }
+    if (first_function >= end_function)
+        return;
     m_step.resize(count);
-    for (auto* scratch : {&m_part, &m_cosine, &m_sine, &m_u, &m_product})
+    for (auto* scratch : {&m_part, &m_cosine, &m_sine, &m_product})
         scratch->resize(count);
     const LowRankBasis& basis = terms.basis;
-    const std::size_t steps = basis.functions.front().values.size() - 1;
-    const double per_step = basis.last > basis.first ? static_cast<double>(steps) / (basis.last - basis.first) : 0.0;
+    const double per_step =
+        basis.last > basis.first ? static_cast<double>(basis.steps) / (basis.last - basis.first) : 0.0;
     find_steps(m_step.data(), m_part.data(), beams.half_tangent.data(), static_cast<float>(basis.first),
-               static_cast<float>(per_step), static_cast<std::uint32_t>(steps), count);
+               static_cast<float>(per_step), static_cast<std::uint32_t>(basis.steps), count);
+    m_u.resize((end_function - first_function) * count);
+    look_up(m_u.data(), end_function - first_function, basis.table.data() + first_function, basis.functions.size(),
+            m_step.data(), m_part.data(), count);
     if (irradiance)
         std::fill_n(m_cosine.data(), count, 1.0f);
     else
         std::copy_n(beams.irradiance.data(), count, m_cosine.data());
     std::fill_n(m_sine.data(), count, 0.0f);
     std::size_t m = 0;
-    std::optional<std::size_t> function;  // whose values are in m_u
-    std::optional<Phase> phase;           // of the product in m_product
+    std::optional<std::size_t> function;  // of the product in m_product
+    std::optional<Phase> phase;
     for (std::size_t t = first; t < end; ++t) {
         const LightTerm& term = terms.terms[t];
-        if (!term.fixed.empty() || colors[term.set] == 0.0f)
+        if (!term.is_moment() || colors[term.set] == 0.0f)
             continue;
-        const LowRankBasis::AngleFunction& wanted = basis.functions[term.function];
-        for (; m < wanted.m; ++m)
+        for (; m < basis.functions[term.function].m; ++m)
             rotate(m_cosine.data(), m_sine.data(), beams.cos_beta.data(), beams.sin_beta.data(), count);
-        if (function != term.function) {
-            look_up(m_u.data(), wanted.values.data(), m_step.data(), m_part.data(), count);
-            phase.reset();
-        }
-        if (phase != term.phase)
-            multiply(m_product.data(), m_u.data(), (term.phase == Phase::cosine ? m_cosine : m_sine).data(), count);
+        if (function != term.function || phase != term.phase)
+            multiply(m_product.data(), m_u.data() + (term.function - first_function) * count,
+                     (term.phase == Phase::cosine ? m_cosine : m_sine).data(), count);
         function = term.function;
         phase = term.phase;
         if (irradiance)

@@ -145,8 +145,8 @@ SurfaceBasis::SurfaceBasis(const std::vector<ChannelMedium>& channels, double ma
         harmonic[lane] = static_cast<std::int32_t>(terms.basis.functions[order[lane]].m);
         rank.push_back(terms.basis.functions[order[lane]].rank);
         float most_light = 0.0f;
-        for (const TableStep& step : terms.basis.functions[order[lane]].values)
-            most_light = std::max(most_light, std::abs(step.value));
+        for (std::size_t step = 0; step <= terms.basis.steps; ++step)
+            most_light = std::max(most_light, std::abs(terms.basis.table[step * chosen.size() + order[lane]].value));
         largest.push_back(most_light);
     }
 }

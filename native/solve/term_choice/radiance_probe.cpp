@@ -48,11 +48,12 @@ RadianceProbe::RadianceProbe(const LightTerms& light, std::vector<std::size_t> l
         }
     }
     m_by_angle.resize(angle_steps * m_row_size);
-    for (const auto& [m, rank, values] : basis.functions) {
+    for (const auto& [m, rank] : basis.functions)
         m_positions.push_back(starts[rank] + m);
-        for (std::size_t step = 0; step < angle_steps; ++step)
-            m_by_angle[step * m_row_size + m_positions.back()] =
-                values[(2 * step + 1) * (values.size() - 1) / (2 * angle_steps)].value;
+    for (std::size_t step = 0; step < angle_steps; ++step) {
+        const std::size_t of_basis = (2 * step + 1) * basis.steps / (2 * angle_steps);
+        for (std::size_t f = 0; f < basis.functions.size(); ++f)
+            m_by_angle[step * m_row_size + m_positions[f]] = basis.table[of_basis * basis.functions.size() + f].value;
     }
 
     double reach = 0.0;
