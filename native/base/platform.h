@@ -2,9 +2,11 @@
 // other branches follow their documentation and have not run.
 #pragma once
 
+#include <algorithm>
 #include <cstddef>
 #include <cstdint>
 #include <cstdio>
+#include <memory>
 #include <new>
 #include <string>
 
@@ -50,6 +52,25 @@ struct HugePageAllocator {
     void deallocate(T* memory, std::size_t /*count*/) { free_pages(memory); }
 
     friend bool operator==(const HugePageAllocator&, const HugePageAllocator&) = default;
+};
+
+// Memory in whole huge pages that is not cleared.
+template <class T>
+class HugePages {
+public:
+    HugePages() = default;
+    explicit HugePages(std::size_t count) : m_memory(HugePageAllocator<T>().allocate(std::max<std::size_t>(count, 1)))
+    {
+    }
+
+    T* data() const { return m_memory.get(); }
+
+private:
+    struct Free {
+        void operator()(T* memory) const { free_pages(memory); }
+    };
+
+    std::unique_ptr<T, Free> m_memory;
 };
 
 }  // namespace beamspread

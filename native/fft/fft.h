@@ -4,7 +4,6 @@
 
 #include <complex>
 #include <cstddef>
-#include <memory>
 #include <string>
 #include <vector>
 
@@ -45,23 +44,19 @@ public:
           m_columns(columns),
           // Columns a power of two apart would share few lines of the cache.
           m_stride((rows + 7) / 8 * 8 + 8),
-          m_data(HugePageAllocator<Complex>().allocate(count * columns * m_stride))
+          m_data(count * columns * m_stride)
     {
     }
 
     std::size_t count() const { return m_count; }
 
-    Complex* column(std::size_t plane, std::size_t i) { return m_data.get() + (plane * m_columns + i) * m_stride; }
+    Complex* column(std::size_t plane, std::size_t i) { return m_data.data() + (plane * m_columns + i) * m_stride; }
 
 private:
-    struct Free {
-        void operator()(Complex* memory) const { HugePageAllocator<Complex>().deallocate(memory, 0); }
-    };
-
     std::size_t m_count;
     std::size_t m_columns;
     std::size_t m_stride;
-    std::unique_ptr<Complex, Free> m_data;
+    HugePages<Complex> m_data;
 };
 
 }  // namespace beamspread

@@ -124,8 +124,8 @@ MomentPlanes::MomentPlanes(const std::vector<LightTerm>& terms, std::size_t texe
     const auto count = static_cast<std::size_t>(std::ranges::count_if(terms, &LightTerm::is_moment));
     // Planes a power of two apart would share few lines of the cache.
     const std::size_t stride = (texels + texels_apart - 1) / texels_apart * texels_apart + texels_apart;
-    m_data.reset(HugePageAllocator<float>().allocate(std::max<std::size_t>(count * stride, 1)));
-    float* next = m_data.get();
+    m_data = HugePages<float>(count * stride);
+    float* next = m_data.data();
     for (const LightTerm& term : terms)
         m_planes.push_back(term.is_moment() ? std::exchange(next, next + stride) : nullptr);
     clear(advance);

@@ -25,18 +25,14 @@ std::vector<float> set_colors(const LightTerms& terms, const std::vector<double>
 void BeamMoments::add(const LightTerms& terms, const BeamRow& beams, const std::vector<float>& colors,
                       std::size_t first, std::size_t end, const Values& values, const float* irradiance)
 {
-    if (first == end || terms.basis.functions.empty())  // the medium is black
-        return;
     const std::size_t count = beams.irradiance.size();
-    std::size_t first_function = terms.basis.functions.size();
-    std::size_t end_function = 0;
-    for (std::size_t t = first; t < end; ++t)
-        if (terms.terms[t].is_moment()) {
-            first_function = std::min(first_function, terms.terms[t].function);
-            end_function = std::max(end_function, terms.terms[t].function + 1);
-        }
-    if (first_function >= end_function)
+    // Moments follow the fixed terms, in the order of their functions.
+    while (first < end && !terms.terms[first].is_moment())
+        ++first;
+    if (first == end)
         return;
+    const std::size_t first_function = terms.terms[first].function;
+    const std::size_t functions = terms.terms[end - 1].function + 1 - first_function;
     m_step.resize(count);
     for (auto* scratch : {&m_part, &m_cosine, &m_sine, &m_product})
         scratch->resize(count);
@@ -45,9 +41,9 @@ void BeamMoments::add(const LightTerms& terms, const BeamRow& beams, const std::
         basis.last > basis.first ? static_cast<double>(basis.steps) / (basis.last - basis.first) : 0.0;
     find_steps(m_step.data(), m_part.data(), beams.half_tangent.data(), static_cast<float>(basis.first),
                static_cast<float>(per_step), static_cast<std::uint32_t>(basis.steps), count);
-    m_u.resize((end_function - first_function) * count);
-    look_up(m_u.data(), end_function - first_function, basis.table.data() + first_function, basis.functions.size(),
-            m_step.data(), m_part.data(), count);
+    m_u.resize(functions * count);
+    look_up(m_u.data(), functions, basis.table.data() + first_function, basis.functions.size(), m_step.data(),
+            m_part.data(), count);
     if (irradiance)
         std::fill_n(m_cosine.data(), count, 1.0f);
     else
@@ -58,7 +54,7 @@ void BeamMoments::add(const LightTerms& terms, const BeamRow& beams, const std::
     std::optional<Phase> phase;
     for (std::size_t t = first; t < end; ++t) {
         const LightTerm& term = terms.terms[t];
-        if (!term.is_moment() || colors[term.set] == 0.0f)
+        if (colors[term.set] == 0.0f)
             continue;
         for (; m < basis.functions[term.function].m; ++m)
             rotate(m_cosine.data(), m_sine.data(), beams.cos_beta.data(), beams.sin_beta.data(), count);
