@@ -10,6 +10,7 @@ import argparse
 import json
 import shutil
 import subprocess
+import sys
 import tempfile
 import time
 from dataclasses import replace
@@ -32,8 +33,11 @@ from beamspread.core.scene.receiver import build_receiver
 from beamspread.core.scene.texture import BaseColor, Texture, TextureUse
 from beamspread.core.target import Target
 
+sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
+
+from virtual_screen import virtual_screen
+
 INSIDE = Path(__file__).resolve().parent / "in_blender" / "live.py"
-SCREEN = ["xvfb-run", "-a", "-s", "-screen 0 1600x1000x24 +extension GLX"]
 WINDOW = ["--factory-startup", "--window-geometry", "0", "0", "640", "480"]
 
 CORNERS = np.array([(-1.0, -1, 0), (1, -1, 0), (1, 1, 0), (-1, 1, 0)])
@@ -50,8 +54,9 @@ def in_window(resolution):
     for shading in ("MATERIAL", "RENDERED"):
         with tempfile.TemporaryDirectory() as folder:
             path = Path(folder) / "results.json"
-            command = [*SCREEN, shutil.which("blender"), *WINDOW, "--python", str(INSIDE), "--"]
-            done = subprocess.run([*command, str(path), shading, str(resolution)], capture_output=True, text=True)
+            command = [shutil.which("blender"), *WINDOW, "--python", str(INSIDE), "--", str(path), shading]
+            with virtual_screen() as screen:
+                done = subprocess.run([*command, str(resolution)], capture_output=True, text=True, env=screen)
             results = json.loads(path.read_text()) if path.exists() else {"error": done.stdout + done.stderr}
         if "error" in results:
             raise RuntimeError(results["error"])

@@ -1,14 +1,14 @@
 """Plays the steps of a test in a Blender with a window, between the window's events.
 
-    xvfb-run blender --factory-startup --python THIS -- SCENARIO RESULTS.json
+    blender --factory-startup --python THIS -- SCENARIO RESULTS.json
 
 SCENARIO names a module with `scenario()`, which yields the conditions that it waits for, `results`, which become the
 file. The add-on is registered once the module is imported.
 """
 
+import faulthandler
 import importlib
 import json
-import os
 import subprocess
 import sys
 import time
@@ -25,20 +25,25 @@ PAUSE_SECONDS = 0.02
 PATIENCE_SECONDS = 60
 """CPU time that a step of a scenario may take. Other processes take none of it, however many there are."""
 
+HANG_SECONDS = 6 * PATIENCE_SECONDS
+"""By the clock: a Blender that no longer calls timers says where it stands, and ends."""
+
 
 def results_of(scenario: str, folder: Path, *, size: tuple[int, int] = (1600, 1000)) -> dict:
     """Results of a scenario that a new Blender with a window and an empty cache plays."""
-    import pytest  # which the new Blender lacks
+    import pytest  # which the new Blender lacks, as it does the folder of the next
+
+    from virtual_screen import virtual_screen
 
     if not bpy.app.binary_path:
         pytest.skip("the bpy module opens no window")
     path = folder / "results.json"
-    screen = ["xvfb-run", "-a", "-s", "-screen 0 1600x1000x24 +extension GLX"]
     options = ["--factory-startup", "--enable-event-simulate", "--window-geometry", "0", "0", *map(str, size)]
     script = ["--python-exit-code", "1", "--python", __file__, "--", scenario, str(path)]
-    environment = os.environ | {"BEAMSPREAD_CACHE": str(folder / "cache")}
-    command = [*screen, bpy.app.binary_path, *options, *script]
-    done = subprocess.run(command, capture_output=True, text=True, timeout=900, env=environment)
+    command = [bpy.app.binary_path, *options, *script]
+    with virtual_screen() as environment:
+        environment["BEAMSPREAD_CACHE"] = str(folder / "cache")
+        done = subprocess.run(command, capture_output=True, text=True, timeout=550, env=environment)
     assert path.exists(), done.stdout + done.stderr
     results = json.loads(path.read_text())
     assert "error" not in results, results["error"]
@@ -81,6 +86,7 @@ def play(steps: Iterator, results: dict, path: Path) -> None:
                 )
                 spent = f"{computed:.0f} s of CPU time, {passed:.0f} s by the clock"
                 raise TimeoutError(f"line {steps.gi_frame.f_lineno} waited in vain ({spent}); threads:\n{stacks}")
+            faulthandler.dump_traceback_later(HANG_SECONDS, exit=True)
             waiting.update({"for": next(steps), "since": clocks()})
             return PAUSE_SECONDS
         except StopIteration:
