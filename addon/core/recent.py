@@ -24,7 +24,10 @@ _of_arrays: dict[tuple, tuple[weakref.ref, object]] = {}
 
 
 def keep_with(array: np.ndarray, key: Hashable, make: Callable[[], T]) -> T:
-    """The value that was made first for an array, which must not change, and a key; it goes with the array."""
+    """The value that was made first for an array, which must not change, and a key; it goes with the array.
+
+    A value that holds the array would keep it.
+    """
     entry = id(array), key
     known = _of_arrays.get(entry)
     if known is not None and known[0]() is array:

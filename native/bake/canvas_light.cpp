@@ -4,6 +4,7 @@
 #include <utility>
 
 #include "bake/patch_sink.h"
+#include "bake/smooth_rays.h"
 
 namespace beamspread {
 
@@ -19,15 +20,6 @@ constexpr double same_direction = 3e-5;
 bool are_same(const Vec3& a, const Vec3& b)
 {
     return glm::distance(a, b) <= same_direction;
-}
-
-// Adds light to a sum over all patches, whose direction to[i] is direction i of the light.
-void add_products(const SmoothLight& light, const std::vector<std::size_t>& to, double share, SmoothLight& sum)
-{
-    const std::size_t count = sum.travel.size();
-    for (std::size_t i = 0; i < to.size(); ++i)
-        for (std::size_t j = 0; j < to.size(); ++j)
-            sum.products[to[i] * count + to[j]] += share * light.products[i * to.size() + j];
 }
 
 }  // namespace
@@ -156,26 +148,21 @@ void CanvasLight::add_inner_moments(int threads, LightField& field, Progress& pr
     progress.finish();
 }
 
-SmoothLight CanvasLight::smooth_light() const
+SmoothLight CanvasLight::smooth_light(const RaySettings& settings, Progress& progress) const
 {
     SmoothLight sum;
-    std::vector<SmoothLight> lights;                // of lit patches
-    std::vector<double> shares;
-    std::vector<std::vector<std::size_t>> places;  // [light][direction] in the sum
+    progress.set_total(1.0);
     for (std::size_t i = 0; i < m_parts.size(); ++i) {
-        if (!m_parts[i])
-            continue;
-        shares.push_back(m_canvas.share(m_canvas.patches[i]));
-        std::vector<std::size_t>& to = places.emplace_back();
-        for (const Vec3f& travel : lights.emplace_back(m_parts[i]->field->smooth_light(m_color)).travel) {
-            to.push_back(static_cast<std::size_t>(std::ranges::find(sum.travel, travel) - sum.travel.begin()));
-            if (to.back() == sum.travel.size())
-                sum.travel.push_back(travel);
-        }
+        const Surface& surface = *m_canvas.patches[i].surface;
+        const double share = m_canvas.share(m_canvas.patches[i]);
+        progress.advance_by(share, [&](Progress& part) {
+            if (m_parts[i])
+                sum.add(m_parts[i]->field ? m_parts[i]->field->smooth_light(m_color)
+                                          : smooth_rays(surface, *m_parts[i], share, settings, part),
+                        share);
+        });
     }
-    sum.products.resize(sum.travel.size() * sum.travel.size());
-    for (std::size_t i = 0; i < lights.size(); ++i)
-        add_products(lights[i], places[i], shares[i], sum);
+    progress.finish();
     return sum;
 }
 

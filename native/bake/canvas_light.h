@@ -43,9 +43,11 @@ public:
     void gather(const std::vector<RaySettings>& settings, RaySink& sink, Progress& progress, bool all = true) const;
     void gather(const RaySettings& settings, RaySink& sink, Progress& progress) const;
 
-    // The moments and the products of smooth light, as `FieldLight` has them for one surface.
+    // Adds the moments of light that was computed elsewhere, as `FieldLight` does for one surface.
     void add_inner_moments(int threads, LightField& field, Progress& progress) const;
-    SmoothLight smooth_light() const;
+
+    // The light as a choice of terms by moments needs it; traced light with few rays. Not on a mirrored canvas.
+    SmoothLight smooth_light(const RaySettings& settings, Progress& progress) const;
 
 private:
     template <class Predicate>

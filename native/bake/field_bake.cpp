@@ -31,6 +31,11 @@ constexpr int survey_rays = 4;
 // The same on a patch among many, at least.
 constexpr std::size_t min_survey_texels = 12;
 
+// Length of the mean direction of a light's rays at a texel, weighed by irradiance and averaged over texels, below which its
+// directions are broad: even light from a cone of half the angle 45 degrees has .87. Larger: more lights share terms for
+// all angles.
+constexpr double broad = 0.9;
+
 // Unit of progress, as those of field_bake.h: one ray from each texel to a light with a size. Larger: a bar that slows
 // down less at such lights.
 constexpr double ray_work = 0.4;
@@ -88,19 +93,6 @@ void add_light(const CanvasLight& light, std::vector<RaySettings> settings, Ligh
     progress.finish();
 }
 
-// The plane of a patch with few texels, wholly covered. `share`: of the texels of all patches.
-Surface survey_surface(const Surface& surface, double share)
-{
-    const auto side = std::clamp(static_cast<std::size_t>(std::sqrt(share) * static_cast<double>(survey_texels)),
-                                 min_survey_texels, survey_texels);
-    Surface coarse{.grid = surface.grid, .clearance = surface.clearance};
-    coarse.grid.width = std::min(surface.grid.width, side);
-    coarse.grid.height = std::min(surface.grid.height, side);
-    coarse.grid.pitch_x *= static_cast<double>(surface.grid.width) / static_cast<double>(coarse.grid.width);
-    coarse.grid.pitch_y *= static_cast<double>(surface.grid.height) / static_cast<double>(coarse.grid.height);
-    return coarse;
-}
-
 // Each light as one for each channel, so that no channel counts as a multiple of another.
 std::vector<PlaneLight> by_channel(const std::vector<PlaneLight>& lights)
 {
@@ -143,7 +135,8 @@ private:
     struct Group {
         std::vector<std::size_t> suns;      // kept, each with a kernel of its own
         std::vector<std::size_t> later;     // added as rays or moments
-        std::vector<std::size_t> examples;  // those of them for which terms are chosen
+        std::vector<std::size_t> examples;  // those of them for whose luminance terms are chosen
+        std::vector<std::size_t> smooth;    // those of them for whose moments terms are chosen
     };
 
     void run(const Group& group, Problem problem, Progress& progress, float* luminance)
@@ -169,9 +162,11 @@ private:
                 for (const std::size_t i : *lights) {
                     mean += m_means[i];
                     std::ranges::copy(m_surveys[i].lights, std::back_inserter(problem.coming.survey));
-                    if (m_lights[i].is_smooth())
-                        problem.coming.smooth.push_back(m_lights[i].smooth_light());
                 }
+            for (const std::size_t i : group.smooth)
+                progress.advance_by(light_work, [&](Progress& part) {
+                    problem.coming.smooth.push_back(m_lights[i].smooth_light(m_options.ray_settings(1), part));
+                });
             // Smooth light is alone in the shadows of others, where its errors count against it and not against all.
             problem.coming.irradiance = std::sqrt(mean * m_mean);
             if (problem.lights.empty() && examples.lights.empty() && mean == 0.0)
@@ -196,6 +191,7 @@ private:
     {
         m_surveys.resize(m_lights.size());
         m_means.assign(m_lights.size(), 0.0);
+        m_flows.assign(m_lights.size(), 0.0);
         m_patch_means.assign(m_lights.size(), std::vector<double>(m_canvas.patches.size()));
         for (std::size_t i = 0; i < m_canvas.patches.size(); ++i)
             survey(i);
@@ -206,7 +202,7 @@ private:
     {
         const Patch& patch = m_canvas.patches[i];
         const double share = m_canvas.share(patch);
-        const Surface coarse = survey_surface(*patch.surface, share);
+        const Surface coarse = patch.surface->coarse(share, survey_texels, min_survey_texels);
         const Canvas alone(coarse);
         const double texels_each =
             static_cast<double>(patch.surface->samples()) / static_cast<double>(coarse.samples());
@@ -228,11 +224,20 @@ private:
                 stored.add_one_direction(alone, on_patch, settings, unseen);
             else
                 stored.add_rays(alone, on_patch, settings, unseen);
+            m_flows[l] += share * stored.mean_flow(coarse.plane());
             m_patch_means[l][i] = stored.mean();
             m_means[l] += share * m_patch_means[l][i];
             for (const PlaneLight& part : light->is_colored(*patch.surface) ? by_channel(stored.lights) : stored.lights)
                 m_surveys[l].lights.push_back({coarse.plane(), texels_each, part});
         }
+    }
+
+    // True if terms are chosen by the moments of a light: they would be the same at most texels, or its rays have no
+    // direction in common.
+    bool is_smooth(std::size_t i) const
+    {
+        const bool is_broad = m_lights[i].has_size() && !m_canvas.is_mirrored() && m_flows[i] < broad * m_means[i];
+        return m_lights[i].is_smooth() || is_broad;
     }
 
     // Decides which lights share a field. Smooth light has one of its own beside others: its angles fill the hemisphere and
@@ -252,13 +257,16 @@ private:
             others.suns.clear();
         for (const std::size_t i : brightest)
             if (std::ranges::find(others.suns, i) == others.suns.end())
-                (m_lights[i].is_smooth() ? smooth : others).later.push_back(i);
+                (is_smooth(i) ? smooth : others).later.push_back(i);
         // A light that the survey missed shines on few texels.
         for (std::size_t k = 0; k < others.later.size(); ++k)
             if (k < max_examples || m_means[others.later[k]] == 0.0)
                 others.examples.push_back(others.later[k]);
-        if (others.later.empty())
-            others.later = std::exchange(smooth.later, {});
+        smooth.smooth = smooth.later;
+        if (others.later.empty()) {
+            std::swap(others.later, smooth.later);
+            std::swap(others.smooth, smooth.smooth);
+        }
         m_groups.push_back(std::move(others));
         if (!smooth.later.empty())
             m_groups.push_back(std::move(smooth));
@@ -290,7 +298,8 @@ private:
     {
         double total = 0.0;
         for (const Group& group : m_groups) {
-            total += light_work * static_cast<double>(group.suns.size() + group.examples.size()) + 2.0 * solver_work;
+            const std::size_t known = group.suns.size() + group.examples.size() + group.smooth.size();
+            total += light_work * static_cast<double>(known) + 2.0 * solver_work;
             for (const std::size_t i : group.later)
                 total += gather_work(i);
         }
@@ -302,6 +311,7 @@ private:
     const BakeOptions& m_options;
     std::vector<Survey> m_surveys;  // [light]
     std::vector<double> m_means;    // [light] mean irradiance of the survey, W/m^2
+    std::vector<double> m_flows;    // [light] mean over texels of the length of the flow, W/m^2
     std::vector<std::vector<double>> m_patch_means;  // [light][patch]
     double m_mean = 0.0;                             // sum of these
     std::vector<Group> m_groups;

@@ -265,11 +265,10 @@ void FieldLight::add_inner_moments(const Surface& surface, const Texel& place, c
 
 SmoothLight FieldLight::smooth_light(const std::vector<double>& color) const
 {
-    SmoothLight light;
     const NodeSpline at_nodes(m_rows, m_columns, m_rows, m_columns);
     const std::size_t nodes = m_rows * m_columns;
     const std::size_t count = m_lobes.size();
-    light.products.resize(count * count);
+    std::vector<double> products(count * count);
     std::vector<float> scratch;
     std::vector<float> lit(nodes);
     const auto read = [&](const std::vector<float>& coefficients, float* values) {
@@ -289,13 +288,14 @@ SmoothLight FieldLight::smooth_light(const std::vector<double>& color) const
                 double sum = 0.0;
                 for (std::size_t k = 0; k < nodes; ++k)
                     sum += static_cast<double>(values[i * nodes + k]) * static_cast<double>(values[j * nodes + k]);
-                light.products[i * count + j] += color[c] * color[c] * sum / (3.0 * static_cast<double>(nodes));
-                light.products[j * count + i] = light.products[i * count + j];
+                products[i * count + j] += color[c] * color[c] * sum / (3.0 * static_cast<double>(nodes));
+                products[j * count + i] = products[i * count + j];
             }
     }
+    std::vector<Vec3f> travel;
     for (const Lobe& lobe : m_lobes)
-        light.travel.push_back(lobe.travel);
-    return light;
+        travel.push_back(lobe.travel);
+    return {travel, products};
 }
 
 }  // namespace beamspread

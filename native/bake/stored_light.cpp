@@ -38,6 +38,11 @@ private:
     }
 };
 
+double mean_of(const std::vector<double>& color)
+{
+    return std::accumulate(color.begin(), color.end(), 0.0) / static_cast<double>(color.size());
+}
+
 double mean_of(const PlaneLight& light)
 {
     double sum = 0.0;
@@ -45,8 +50,7 @@ double mean_of(const PlaneLight& light)
         for (std::size_t x = 0; x < light.irradiance.width; ++x)
             sum += static_cast<double>(light.irradiance(y, x));
     const double texels = static_cast<double>(light.irradiance.height * light.irradiance.width);
-    return sum * std::accumulate(light.color.begin(), light.color.end(), 0.0) /
-           (texels * static_cast<double>(light.color.size()));
+    return sum * mean_of(light.color) / texels;
 }
 
 // The irradiance on some patches; 0 elsewhere.
@@ -159,6 +163,20 @@ double StoredLight::mean() const
     for (const PlaneLight& light : lights)
         sum += mean_of(light);
     return sum;
+}
+
+double StoredLight::mean_flow(const Plane& plane) const
+{
+    double sum = 0.0;
+    for (std::size_t y = 0; y < plane.height; ++y)
+        for (std::size_t x = 0; x < plane.width; ++x) {
+            Vec3 flow(0.0);
+            for (const PlaneLight& light : lights)
+                flow += mean_of(light.color) * static_cast<double>(light.irradiance(y, x)) *
+                        glm::normalize(travel_at(plane, light.directions, y, x));
+            sum += glm::length(flow);
+        }
+    return sum / static_cast<double>(plane.texels());
 }
 
 }  // namespace beamspread

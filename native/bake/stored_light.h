@@ -31,6 +31,9 @@ struct StoredLight {
 
     // Mean irradiance of all lights, texels and channels, W/m^2.
     double mean() const;
+
+    // Mean over texels and channels of the length of the sum of irradiance times direction, W/m^2.
+    double mean_flow(const Plane& plane) const;
 };
 
 }  // namespace beamspread

@@ -19,6 +19,10 @@ struct Surface {
     std::size_t samples() const { return grid.width * grid.height; }
     Plane plane() const { return {grid.width, grid.height, grid.pitch_x, grid.pitch_y}; }
 
+    // The surface alone, wholly covered, with few texels for a survey: at most `side` along each side, fewer and at least
+    // `min_side` if it has but a `share` of all surfaces' texels.
+    Surface coarse(double share, std::size_t side, std::size_t min_side) const;
+
     // Multiplies luminance [sample][channel] by the color of light that leaves.
     void scale_by_color_out(std::size_t channels, float* luminance) const
     {

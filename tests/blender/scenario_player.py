@@ -49,7 +49,8 @@ def results_of(scenario: str, folder: Path, *, size: tuple[int, int] = (1600, 10
     assert "error" not in results, results["error"]
     assert results["complete"]
     assert done.returncode == 0, done.stderr
-    assert "Traceback" not in done.stdout + done.stderr
+    said = done.stdout + done.stderr
+    assert "Traceback" not in said, said
     return results
 
 

@@ -8,7 +8,8 @@ import pytest
 from beamspread.blender.read.image_nodes import MAX_WIDTH, shrunk
 from beamspread.blender.read.lights import read_illumination
 from beamspread.blender.read.scene_cache import scene_cache
-from beamspread.blender.read.world_light import directions
+from beamspread.core.scene.lights import SunLight
+from beamspread.core.scene.lights.sky_sun import directions
 from cycles_truth import add_receiver, cycles_irradiance, read
 from mathutils import Euler, Matrix
 from nodes import Nodes
@@ -43,7 +44,9 @@ def the_world():
 
 
 def irradiance(light, normal):
-    """Plain sum over the texels of a panorama, each of which is a patch of sky, cut into 4 x 4."""
+    """Plain sum over the texels of a panorama, each of which is a patch of sky, cut into 4 x 4; or of a narrow sun."""
+    if isinstance(light, SunLight):
+        return max(-np.dot(light.direction, normal), 0) * light.rgb()
     height, width = light.radiance.shape[:2]
     finer = max(1, 1024 // width)
     radiance = np.repeat(np.repeat(light.radiance, finer, axis=0), finer, axis=1).astype(float)
@@ -55,12 +58,12 @@ def irradiance(light, normal):
     return seen @ radiance.reshape(-1, 3) * light.rgb()
 
 
-def assert_agrees(light, tilt, samples=2048, rel=0.01):
+def assert_agrees(lights, tilt, samples=2048, rel=0.01):
     plane, image = add_receiver(tilt, texels=8)
     cycles = cycles_irradiance(plane, image, samples).mean(axis=(0, 1))
     normal = tilt.to_3x3().col[2]
     bpy.data.objects.remove(plane)
-    assert irradiance(light, normal) == pytest.approx(cycles, rel=rel)
+    assert sum(irradiance(light, normal) for light in lights) == pytest.approx(cycles, rel=rel)
 
 
 def test_an_even_world():
@@ -69,7 +72,7 @@ def test_an_even_world():
     assert light.rgb() == pytest.approx((2, 1, 0.5))
     assert not light.is_colored
     assert light.cast_shadow
-    assert_agrees(light, TILTS["tilted"], 1, 1e-3)
+    assert_agrees([light], TILTS["tilted"], 1, 1e-3)
 
 
 def test_a_world_without_nodes():
@@ -78,7 +81,7 @@ def test_a_world_without_nodes():
     world = add_world()[0].owner
     world.use_nodes, world.color = False, (0.2, 0.3, 0.4)
     assert the_world().rgb() == pytest.approx((0.2, 0.3, 0.4))
-    assert_agrees(the_world(), TILTS["up"], 1, 1e-3)
+    assert_agrees(read().lights, TILTS["up"], 1, 1e-3)
 
 
 def no_diffuse(world):
@@ -115,7 +118,7 @@ def test_a_dark_world_is_no_light(darken):
 def test_studio_lights(name, tilt):
     _, background = add_world(strength=1.5)
     add_environment(studio(name), background)
-    assert_agrees(the_world(), tilt)
+    assert_agrees(read().lights, tilt)
 
 
 TURNS = [(0, 0, 0.7), (0.3, -0.5, 2.0), (math.pi, 0, 0)]
@@ -134,7 +137,7 @@ def test_a_turned_environment_keeps_its_texels(turn):
     if tuple(factors) == (1, 1):
         assert light.radiance == pytest.approx(stored, rel=1e-5, abs=1e-6)
     assert np.linalg.det(light.to_world) == pytest.approx(1)
-    assert_agrees(light, TILTS["tilted"])
+    assert_agrees([light], TILTS["tilted"])
 
 
 def test_a_mirrored_and_a_stretched_environment():
@@ -144,7 +147,7 @@ def test_a_mirrored_and_a_stretched_environment():
     mapping = texture.inputs["Vector"].links[0].from_node
     for scale in ((-1, 1, 1), (1, 1, 2.5)):
         mapping.inputs["Scale"].default_value = scale
-        assert_agrees(the_world(), TILTS["tilted"])
+        assert_agrees(read().lights, TILTS["tilted"])
 
 
 def test_images_of_few_texels_are_smooth():
@@ -154,7 +157,7 @@ def test_images_of_few_texels_are_smooth():
     image.pixels.foreach_set(values.ravel())
     add_environment(image, background)
     for tilt in TILTS.values():
-        assert_agrees(the_world(), tilt)
+        assert_agrees(read().lights, tilt)
 
 
 def test_mixed_and_graded_environments():
@@ -165,7 +168,7 @@ def test_mixed_and_graded_environments():
     for socket, value in zip((one for one in mix.inputs if one.enabled), (0.7, hue.outputs["Color"], (1, 0.4, 0.2, 1))):
         nodes.set(socket, value)
     nodes.set(background.inputs["Color"], next(one for one in mix.outputs if one.enabled))
-    assert_agrees(the_world(), TILTS["tilted"])
+    assert_agrees(read().lights, TILTS["tilted"])
 
 
 def test_light_that_changes_with_the_direction():
@@ -175,7 +178,7 @@ def test_light_that_changes_with_the_direction():
     ramp.color_ramp.elements[0].color, ramp.color_ramp.elements[1].color = (1, 0.3, 0.1, 1), (0.1, 0.3, 2, 1)
     nodes.set(background.inputs["Color"], ramp.outputs["Color"])
     for tilt in TILTS.values():
-        assert_agrees(the_world(), tilt)
+        assert_agrees(read().lights, tilt)
 
 
 SPACES = ["sRGB", "Non-Color", "Filmic sRGB", "Linear", "Linear Rec.709"]
@@ -202,7 +205,7 @@ def test_color_spaces_of_images(kind, space, tmp_path):
         assert "its color space is Filmic sRGB" in illumination.by_cycles["World"].text
         return
     # Blender reads 8 bits of HDR files a little differently from Cycles.
-    assert_agrees(the_world(), TILTS["up"], 1024, 0.02 if kind == "HDR" else 0.005)
+    assert_agrees(read().lights, TILTS["up"], 1024, 0.02 if kind == "HDR" else 0.005)
 
 
 @pytest.mark.parametrize("mode", ["STRAIGHT", "PREMUL", "CHANNEL_PACKED", "NONE"])
@@ -214,7 +217,7 @@ def test_alpha_of_images(is_float, mode):
     _, background = add_world()
     add_environment(image, background)
     # Cycles rounds bytes down after it has multiplied them by alpha.
-    assert_agrees(the_world(), TILTS["up"], 1024, 0.01)
+    assert_agrees(read().lights, TILTS["up"], 1024, 0.01)
 
 
 def test_huge_images_are_averaged_with_their_energy():

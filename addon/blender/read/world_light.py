@@ -9,6 +9,7 @@ import numpy as np
 
 from ...core.errors import NotSupportedError
 from ...core.scene.lights import WorldLight
+from ...core.scene.lights.sky_sun import directions
 from .. import compat
 from .image_nodes import MAX_WIDTH, Images
 from .nodes import InputSocket, Links, surface_of
@@ -107,17 +108,6 @@ def _finest(lookups: list, probes: np.ndarray) -> tuple[np.ndarray, int, int]:
         return rotation, *((MAX_WIDTH, MAX_WIDTH // 2) if lookups else (WIDTH, HEIGHT))
     # Cycles interpolates between the texels of a coarse image.
     return rotation, width * -(-WIDTH // width), height * -(-HEIGHT // height)
-
-
-def directions(width: int, height: int, rows: slice) -> np.ndarray:
-    """Unit vectors (N, 3) to the texel centers of some rows of an equirectangular image; see `WorldLight`."""
-    azimuth = np.pi * (1 - 2 * (np.arange(width) + 0.5) / width)
-    elevation = np.pi * ((np.arange(height)[rows] + 0.5) / height - 0.5)
-    towards = np.empty((len(elevation), width, 3))
-    towards[..., 0] = np.cos(elevation)[:, None] * np.cos(azimuth)
-    towards[..., 1] = np.cos(elevation)[:, None] * np.sin(azimuth)
-    towards[..., 2] = np.sin(elevation)[:, None]
-    return towards.reshape(-1, 3)
 
 
 def _points(images: Images, towards: np.ndarray, check: Callable[[], None] | None) -> ShadingPoints:

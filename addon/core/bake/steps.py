@@ -26,7 +26,7 @@ SUNS, NARROW, WIDE = range(3)
 """Kinds of light: suns alone; one direction at each texel; any other."""
 
 BYTES = {
-    "fft": ((50e6, 80), (400e6, 80), (600e6, 80)),
+    "fft": ((50e6, 80), (400e6, 80), (400e6, 80)),
     "direct": ((50e6, 140), (100e6, 300), (250e6, 520)),
     "adaptive": ((50e6, 140), (100e6, 180), (250e6, 400)),
 }

@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Collection, Iterable, Mapping, Sequence
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from copy import copy
 
 import numpy as np
 
 from ..messages import Message, Messages
 from .bent_grid import AnyGrid
-from .lights import FieldLight, Light
+from .lights import FieldLight, Light, WorldLight
 from .occluders import Mesh, Occluder, build
 
 # Distance of the origins that shadows are traced relative to, texels; up to twice as far. Larger values let more
@@ -41,7 +41,7 @@ class Illumination:
         untraceable: str = "",
     ) -> None:
         """`max_crossings`: number of see-through surfaces that light crosses before it ends at the next; None: any."""
-        self.lights = tuple(lights)
+        self.lights = tuple(_divided(lights))
         self.by_cycles, self.receivers = dict(by_cycles or {}), dict(receivers or {})
         self.untraceable = untraceable
         self._messages = tuple(messages)
@@ -89,7 +89,7 @@ class Illumination:
     def lit_by(self, lights: Sequence[Light]) -> Illumination:
         """A copy with more lights."""
         more = copy(self)
-        more.lights = (*self.lights, *lights)
+        more.lights = (*self.lights, *_divided(lights))
         return more
 
     def native_lights(self, grid: AnyGrid) -> list[tuple]:
@@ -172,3 +172,9 @@ class Illumination:
             occluders = [occluder for occluder in self._occluders if chosen is None or occluder.name in chosen]
             self._casters[origin, chosen] = build(occluders, origin, self._max_crossings)
         return self._casters[origin, chosen]
+
+
+def _divided(lights: Iterable[Light]) -> Iterator[Light]:
+    """The lights, with the suns of worlds apart."""
+    for light in lights:
+        yield from light.parts() if isinstance(light, WorldLight) else (light,)

@@ -8,6 +8,7 @@
 #include "base/vec.h"
 #include "base/view.h"
 #include "ldf/radial/ldf_source.h"
+#include "solve/problem/smooth_light.h"
 
 namespace beamspread {
 
@@ -120,12 +121,6 @@ struct ChannelMedium {
     Side side = Side::reflected;  // of the luminance: where light enters, or the far side of a slab
 
     bool operator==(const ChannelMedium&) const = default;
-};
-
-// Light whose directions are the same at all texels and whose irradiance changes slowly.
-struct SmoothLight {
-    std::vector<Vec3f> travel;     // [direction] unit vectors of the plane frame, z < 0
-    std::vector<double> products;  // [direction][direction] mean over texels and channels, of irradiances, (W/m^2)^2
 };
 
 // Light at few texels that are spread over a part of the plane.

@@ -1,8 +1,7 @@
 #include <algorithm>
-#include <cmath>
+#include <array>
 #include <numeric>
 
-#include "base/constants.h"
 #include "solve/term_choice/choose_terms.h"
 
 namespace beamspread {
@@ -11,7 +10,7 @@ namespace {
 
 // Fraction of the tolerance that errors of smooth light may use, root mean square over the plane and relative to the mean
 // of all light. Larger: fewer terms, larger errors.
-constexpr double smooth_budget = 0.05;
+constexpr double smooth_budget = 0.025;
 
 // Error of the radiance without a term of harmonic m, per moment: light that is even within a kernel's reach cancels in
 // all harmonics but 0, and beside a border a part is left that falls as 1 / m.
@@ -20,23 +19,13 @@ double error_of(std::size_t m)
     return m == 0 ? 1.0 : 0.5 / static_cast<double>(m);
 }
 
-// Mean square over the plane of the moments of both phases, (W/m^2)^2.
-double squared_moments(const KernelDecomposition& kernels, std::size_t term, const SmoothLight& light)
+// What is lost without a term, at the angles of smooth light.
+std::array<double, SmoothLight::angles> function_of(const KernelDecomposition& kernels, std::size_t term)
 {
-    const std::size_t count = light.travel.size();
-    const auto m = static_cast<double>(kernels.terms()[term].m);
-    std::vector<double> size;
-    std::vector<double> angle;
-    for (const Vec3f& travel : light.travel) {
-        const Vec3 direction(travel);
-        size.push_back(kernels.function(term, std::tan(0.5 * incidence_deg(direction) * radians_per_degree)));
-        angle.push_back(m * azimuth(direction));
-    }
-    double sum = 0.0;
-    for (std::size_t i = 0; i < count; ++i)
-        for (std::size_t j = 0; j < count; ++j)
-            sum += light.products[i * count + j] * size[i] * size[j] * std::cos(angle[i] - angle[j]);
-    return std::max(sum, 0.0);
+    std::array<double, SmoothLight::angles> values{};
+    for (std::size_t i = 0; i < values.size(); ++i)
+        values[i] = kernels.function(term, SmoothLight::half_tangent(i));
+    return values;
 }
 
 }  // namespace
@@ -45,9 +34,10 @@ std::vector<std::size_t> smooth_terms(const KernelDecomposition& kernels, const 
 {
     std::vector<double> squared_error(kernels.terms().size());
     for (std::size_t t = 0; t < squared_error.size(); ++t) {
+        const auto function = function_of(kernels, t);
         double sum = 0.0;
         for (const SmoothLight& light : coming.smooth)
-            sum += squared_moments(kernels, t, light);
+            sum += light.squared_moment(kernels.terms()[t].m, function);
         const double factor = error_of(kernels.terms()[t].m);
         squared_error[t] = sum * factor * factor;
     }

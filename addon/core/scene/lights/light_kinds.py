@@ -12,6 +12,7 @@ from ...native import native
 from ...recent import keep_with
 from ..bent_grid import AnyGrid
 from ..grid import Vector
+from .sky_sun import without_suns
 
 
 @dataclass(frozen=True)
@@ -246,6 +247,26 @@ class WorldLight(Light):
 
     def fault(self):
         return self._radiance_fault(self.radiance) or super().fault()
+
+    def parts(self) -> tuple[Light, ...]:
+        """The light without the suns in its image, and these; itself if there are none.
+
+        A sun has few directions, and shadows far sharper than the sky's. As a light of its own it takes fewer rays, and
+        one kernel.
+        """
+        divided = keep_with(self.radiance, "suns", lambda: without_suns(self.radiance))
+        if divided is None:
+            return (self,)
+        shared = {"blockers": self.blockers, "receivers": self.receivers}
+        suns = []
+        for spot in divided[1]:
+            strength = float(spot.irradiance.max())
+            color = tuple((spot.irradiance / strength * self.color).tolist())
+            travel = tuple((-(np.array(self.to_world) @ spot.toward)).tolist())
+            suns.append(
+                SunLight(self.name, self.strength * strength, color, self.cast_shadow, travel, spot.angle, **shared)
+            )
+        return (replace(self, radiance=divided[0]), *suns)
 
     def coarse(self, max_rows: int) -> WorldLight:
         """The light with means of texels, so that its image has at most this many rows."""
