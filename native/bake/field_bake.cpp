@@ -163,12 +163,15 @@ private:
                     mean += m_means[i];
                     std::ranges::copy(m_surveys[i].lights, std::back_inserter(problem.coming.survey));
                 }
-            for (const std::size_t i : group.smooth)
+            double faint = 0.0;
+            for (const std::size_t i : group.smooth) {
+                faint += m_means[i];
                 progress.advance_by(light_work, [&](Progress& part) {
                     problem.coming.smooth.push_back(m_lights[i].smooth_light(m_options.ray_settings(1), part));
                 });
+            }
             // Smooth light is alone in the shadows of others, where its errors count against it and not against all.
-            problem.coming.irradiance = std::sqrt(mean * m_mean);
+            problem.coming.irradiance = std::sqrt(faint * m_mean);
             if (problem.lights.empty() && examples.lights.empty() && mean == 0.0)
                 return;
             progress.advance_by(solver_work,

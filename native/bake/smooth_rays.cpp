@@ -9,7 +9,7 @@ namespace {
 
 // Texels along a side of a square plane that rays are traced from, at least as many on each of several, and rays of each of
 // two estimates. Larger: more terms are found to have no light but noise.
-constexpr std::size_t texels_along_side = 64;
+constexpr std::size_t texels_along_side = 32;
 constexpr std::size_t min_texels_along_side = 4;
 constexpr int rays_of_estimate = 64;
 
