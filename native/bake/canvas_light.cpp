@@ -80,7 +80,9 @@ std::optional<Directions> CanvasLight::directions() const
         const Vec3 of_part = std::get<OneDirection>(*directions).travel;
         return !are_same(of_part, travel.emplace(travel.value_or(of_part)));
     });
-    return differ ? std::nullopt : std::optional<Directions>(OneDirection{*travel});
+    if (differ || !travel)
+        return std::nullopt;
+    return OneDirection{*travel};
 }
 
 std::vector<std::pair<OneDirection, std::vector<std::size_t>>> CanvasLight::parallel() const

@@ -22,7 +22,7 @@ KINDS = {
     # Its world is for the eye alone.
     "marble_floor": ["MeshLight", "PointLight", "SunLight", "SunLight"],
     "low_sun": ["SunLight", "SunLight"],
-    "soapstone": ["WorldLight"],
+    "soapstone": ["SunLight", "WorldLight"],
     "stage": ["AreaLight"] + ["SpotLight"] * 4,
     "shop_window": ["AreaLight"] * 2 + ["MeshLight"] * 9,
     "soap_bar": ["PointLight", "WorldLight"],
