@@ -95,11 +95,6 @@ def _tick() -> float:
         return OFF_SECONDS
 
 
-def _tick_while_busy() -> float | None:
-    seconds = _tick()
-    return seconds if seconds == BUSY_SECONDS else None
-
-
 def _changed(depsgraph) -> None:
     """Take note of a change, of any change after undo and loading."""
     if depsgraph is None:
@@ -108,8 +103,6 @@ def _changed(depsgraph) -> None:
         _remove_strays()
     elif live.session is not None and depsgraph.mode == "VIEWPORT" and depsgraph.scene.name == live.scene_name:
         live.session.note(depsgraph)
-        if not bpy.app.background and not bpy.app.timers.is_registered(_tick_while_busy):
-            bpy.app.timers.register(_tick_while_busy)  # the other tick may be `IDLE_SECONDS` away
 
 
 @persistent
@@ -146,9 +139,8 @@ def _start() -> None:
 
 
 def _stop() -> None:
-    for tick in (_tick, _tick_while_busy):
-        if bpy.app.timers.is_registered(tick):
-            bpy.app.timers.unregister(tick)
+    if bpy.app.timers.is_registered(_tick):
+        bpy.app.timers.unregister(_tick)
     end()
 
 
