@@ -81,10 +81,13 @@ def test_other_bright_places_stay_part_of_the_sky(degrees, radiance):
     assert light.parts() == (light,)
 
 
-def test_coarse_images_and_dark_ones_have_no_sun():
+def test_coarse_images_dark_ones_and_wrong_ones_have_no_sun():
     coarse = np.zeros((32, 64, 3), np.float32)
     coarse[20, 7] = 1e4
-    for image in (coarse, np.zeros((HEIGHT, WIDTH, 3), np.float32)):
+    dark = np.zeros((HEIGHT, WIDTH, 3), np.float32)
+    endless, unknown = dark.copy(), dark.copy()
+    endless[400, 7], unknown[400, 7] = np.inf, np.nan
+    for image in (coarse, dark, endless, unknown):
         light = world(image)
         assert light.parts() == (light,)
 

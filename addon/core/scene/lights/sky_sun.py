@@ -68,7 +68,7 @@ def _brightest(radiance: np.ndarray) -> tuple[Spot, tuple[np.ndarray, np.ndarray
     reach = REACH - 0.5 * math.hypot(texel_x, texel_y)
     brightness = radiance.sum(2)
     row, column = np.unravel_index(brightness.argmax(), brightness.shape)
-    if reach <= 0 or not brightness[row, column] > 0:
+    if reach <= 0 or not 0 < brightness[row, column] < math.inf:
         return None
     borders = np.sin(math.pi * (np.arange(height + 1) / height - 0.5))
     solid_angles = texel_x * np.diff(borders)
