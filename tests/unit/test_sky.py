@@ -8,9 +8,10 @@ from _native_test import irradiance
 from beamspread.core.bake import spread_light
 from beamspread.core.bake.bake_settings import BakeSettings
 from beamspread.core.material import Material
+from beamspread.core.native import native
 from beamspread.core.scene.illumination import Illumination
 from beamspread.core.scene.lights import SunLight, WorldLight
-from beamspread.core.scene.lights.sky_sun import directions
+from beamspread.core.scene.lights.sky_sun import REACH, directions
 from beamspread.core.scene.occluders import Mesh
 
 from bakes import bake, square
@@ -90,6 +91,13 @@ def test_coarse_images_dark_ones_and_wrong_ones_have_no_sun():
     for image in (coarse, dark, endless, unknown):
         light = world(image)
         assert light.parts() == (light,)
+
+
+def test_suns_have_one_kernel():
+    assert pytest.approx(native.SunLight.max_parallel_angle, rel=1e-12) == 2 * REACH
+    image = disk(direction(2.0, 0.8), math.radians(1.2), (9e3,) * 3)
+    assert all(light.is_parallel for light in world(image).parts()[1:])
+    assert len(world(image).parts()) == 2
 
 
 def test_two_suns():

@@ -7,10 +7,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ...native import native
-
-# Half the angle of the largest spot: a cone whose axis stands for all its directions inside a medium.
-REACH = 0.5 * native.SunLight.max_parallel_angle
+# Half the angle of the largest spot, radians: the axis of native `SunLight`'s widest cone stands for all its directions
+# inside a medium.
+REACH = math.radians(1.0)
 
 # Steps from the brightest texel to the middle of a spot. More: larger spots are found whole.
 STEPS = 8
