@@ -24,7 +24,7 @@ struct Place {
 
     explicit Place(const Vec3f& travel)
     {
-        const float across = std::hypot(travel.x, travel.y);
+        const float across = std::sqrt(travel.x * travel.x + travel.y * travel.y);  // hypotf asks for a new glibc
         azimuth = across > 0.0f ? std::complex(travel.x / across, travel.y / across) : std::complex(1.0f, 0.0f);
         const float at = across / (1.0f - travel.z) * static_cast<float>(SmoothLight::angles - 1);  // tan(theta / 2)
         first = std::min(static_cast<std::size_t>(at), SmoothLight::angles - 2);
