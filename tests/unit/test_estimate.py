@@ -219,10 +219,12 @@ def test_estimates_have_a_subject():
 @pytest.mark.parametrize(
     ("texels", "pieces", "channels", "lit", "path", "cpu"),
     [
-        (98_000, 1.0, 1, 1.0, 0.64, 5.9),  # the default cube at 512 x 512, under its lamp and world
-        (45_000, 1.95, 1, 1.0, 2.08, 7.6),  # a UV sphere, whose texels are long at its poles
-        (45_000, 1.95, 3, 1.0, 8.3, 16.0),  # the same of three media
-        (257_000, 1.0, 3, 0.5, 7.0, 20.0),  # the worn soap of blend_examples
+        (98_000, 1.0, 3, 1.0, 1.28, 6.8),  # the default cube at 512 x 512, of three media, under its lamp and world
+        (170_000, 1.75, 1, 1.0, 2.3, 11.3),  # a UV sphere, whose texels are long at its poles
+        (170_000, 1.75, 3, 1.0, 0.47, 12.4),  # the same of three media, with short, middle and long paths
+        (170_000, 1.75, 3, 1.0, 2.3, 25.1),
+        (170_000, 1.75, 3, 1.0, 9.3, 61.0),
+        (143_000, 1.02, 3, 1.0, 3.3, 11.3),  # the bar of soap of blend_examples
     ],
 )
 def test_bodies_take_longer_the_farther_their_light_spreads(texels, pieces, channels, lit, path, cpu):
@@ -230,7 +232,7 @@ def test_bodies_take_longer_the_farther_their_light_spreads(texels, pieces, chan
     load = Workload(texels, is_bent=True, pieces=pieces, channels=channels, lit=lit, path=path)
     one_thread = replace(SETTINGS, threads=1)
     assert cpu / 1.7 < load.seconds(one_thread) < cpu * 1.7
-    assert replace(load, path=0.1).seconds(one_thread) < 0.5 * load.seconds(one_thread)
+    assert replace(load, path=0.1 * path).seconds(one_thread) < 0.5 * load.seconds(one_thread)
 
 
 def test_channels_of_one_medium_share_their_light_under_one_color():

@@ -30,17 +30,17 @@ ANY_BAKE, ANY_PLANE = 0.05, 2e-3
 
 # Seconds per texel of the transforms for suns alone; for lamps of one direction at each texel, with an index of
 # refraction above 1 and without; and for any other light.
-SUNS, LAMPS, WIDE = 0.06e-6, (1.0e-6, 1.8e-6), (4e-6, 5e-6)
+SUNS, LAMPS, WIDE = 0.06e-6, (1.0e-6, 1.8e-6), (2.4e-6, 3.6e-6)
 # Seconds of the choice of terms for other light.
 CHOICE = 0.1, 0.3
 # The same of each further plane.
-CHOICE_OF_PLANE = 0.45
+CHOICE_OF_PLANE = 0.05
 # Multiple of slabs of one mean free path with an index of refraction above 1; thicker ones come closer to 1.
 THIN_SLAB = 6.0
 
 # Seconds of a ray that is traced, in any case; besides, with the obstacles of `MANY_TRIANGLES`, towards lights all
 # around, and towards others.
-OPEN_RAY, BROAD_RAY, NARROW_RAY = 0.22e-6, 0.14e-6, 0.12e-6
+OPEN_RAY, BROAD_RAY, NARROW_RAY = 0.15e-6, 0.17e-6, 0.12e-6
 # Seconds per texel and lamp of the rays to a lamp without a size, and for each doubling of `MANY_TRIANGLES`: their
 # shadows have more borders.
 LAMP_RAYS, LAMP_TRIANGLES = 0.3e-6, 1.0e-6
@@ -51,9 +51,8 @@ MANY_TRIANGLES = 1000
 ADAPTIVE, DIRECT = (1e-6, 3e-6), (0.2e-9, 30e-9)
 
 # Seconds of the solution on surfaces that bend: in any case, for the tables of its media; and for each piece of a texel
-# and each channel of its own: in any case, up to a mean free path of a texel in proportion to it, and for each doubling
-# of longer ones.
-BENT, BENT_TEXEL, BENT_SHORT, BENT_LONG = 1.1, 1e-6, 36e-6, 3e-6
+# with a mean free path of a texel, and each channel of its own there. They grow with this power of the path.
+BENT, BENT_TEXEL, BENT_CHANNEL, BENT_POWER = 2.2, 6e-6, 14e-6, 0.55
 # Part of a surface that bends that lamps and suns light, about.
 LIT_BY_LAMPS = 0.5
 
@@ -222,9 +221,8 @@ class Workload:
         is_wide = self.broad_rays + self.narrow_rays > 0
         directions = self.lamps + self.broad_rays + self.narrow_rays + len(STRATA) * self.bounced
         if self.is_bent and settings.solver != "direct":
-            doublings = math.log2(max(self.path, 1.0))
-            of_sample = BENT_TEXEL + BENT_SHORT * min(self.path, 1.0) + BENT_LONG * doublings
-            return BENT + of_sample * self.texels * self.pieces * self.channels * self.lit
+            of_piece = (BENT_TEXEL + BENT_CHANNEL * self.channels) * self.path**BENT_POWER
+            return BENT + of_piece * self.texels * self.pieces * self.lit
         if settings.solver != "fft":
             sun, direction = ADAPTIVE if settings.solver == "adaptive" else DIRECT
             pairs = self.texels if settings.solver == "adaptive" else self.texels**2
