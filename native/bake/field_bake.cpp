@@ -36,6 +36,10 @@ constexpr std::size_t min_survey_texels = 12;
 // all angles.
 constexpr double broad = 0.9;
 
+// Errors of terms that broad light does without count as much more if it is traced: what it loses has noise of its rays,
+// which differs from plane to plane. Larger: more terms, smaller errors.
+constexpr double traced_weight = 2.0;
+
 // Unit of progress, as those of field_bake.h: one ray from each texel to a light with a size. Larger: a bar that slows
 // down less at such lights.
 constexpr double ray_work = 0.4;
@@ -164,14 +168,16 @@ private:
                     std::ranges::copy(m_surveys[i].lights, std::back_inserter(problem.coming.survey));
                 }
             double faint = 0.0;
+            bool is_traced = false;
             for (const std::size_t i : group.smooth) {
                 faint += m_means[i];
+                is_traced |= !m_lights[i].is_smooth();
                 progress.advance_by(light_work, [&](Progress& part) {
                     problem.coming.smooth.push_back(m_lights[i].smooth_light(m_options.ray_settings(1), part));
                 });
             }
             // Smooth light is alone in the shadows of others, where its errors count against it and not against all.
-            problem.coming.irradiance = std::sqrt(faint * m_mean);
+            problem.coming.irradiance = std::sqrt(faint * m_mean) / (is_traced ? traced_weight : 1.0);
             if (problem.lights.empty() && examples.lights.empty() && mean == 0.0)
                 return;
             progress.advance_by(solver_work,

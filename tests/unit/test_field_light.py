@@ -294,8 +294,8 @@ def test_terms_of_smooth_light_are_few_and_enough():
 def test_terms_of_smooth_light_are_enough_in_the_shadow_of_a_bright_light(name):
     """The other light, 150 times as strong, would hide errors of faint light that is alone in its shadow.
 
-    Against a solver that adds all rays: a fortieth of a bake's tolerance of 5e-3, root mean square, relative to the
-    geometric mean of both lights, is 1.6e-3 of the faint one. Relative to all light it would be ten times as much.
+    Against a solver that adds all rays: a twentieth of a bake's tolerance of 5e-3, root mean square, relative to the
+    geometric mean of both lights, is 3.1e-3 of the faint one. Relative to all light it would be ten times as much.
     """
     grid = replace(grid_of(40, 40), coverage=np.tri(40, dtype=np.float32))
     faint = light_of(grid, np.random.default_rng(5).random((len(STRATA), 4, 4, 3)))
@@ -308,7 +308,7 @@ def test_terms_of_smooth_light_are_enough_in_the_shadow_of_a_bright_light(name):
         bake(grid, light, SLOPING, 0.0, BakeSettings(quality="preview", solver=solver)) for solver in ("fft", "direct")
     )
     error = np.sqrt(np.mean((by_fft - by_direct) ** 2)) / by_direct.mean()
-    assert error < 1.6e-3
+    assert error < 3.1e-3
 
 
 def test_threads_change_no_bit():

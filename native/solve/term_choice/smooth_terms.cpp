@@ -10,7 +10,7 @@ namespace {
 
 // Fraction of the tolerance that errors of smooth light may use, root mean square over the plane and relative to the mean
 // of all light. Larger: fewer terms, larger errors.
-constexpr double smooth_budget = 0.025;
+constexpr double smooth_budget = 0.05;
 
 // Error of the radiance without a term of harmonic m, per moment: light that is even within a kernel's reach cancels in
 // all harmonics but 0, and beside a border a part is left that falls as 1 / m.
