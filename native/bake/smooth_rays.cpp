@@ -27,11 +27,9 @@ public:
     {
         const std::size_t first = run.ray * rays_of.texels + run.sample;
         std::copy_n(run.travel, run.count, rays_of.travel.begin() + static_cast<std::ptrdiff_t>(first));
-        Vec3 sum(0.0);
         for (std::size_t i = 0; i < run.count; ++i) {
             const Vec3 light = Vec3(run.irradiance[i]) * Vec3(m_color[0], m_color[1], m_color[2]);
             rays_of.irradiance[first + i] = static_cast<float>((light.x + light.y + light.z) / 3.0);
-            sum += light;
         }
     }
 
@@ -56,6 +54,7 @@ SmoothLight smooth_rays(const Surface& surface, const SurfaceLight& light, doubl
     RayStore second(coarse.samples(), rays_of_estimate, light.color);
     settings.seed += 1;
     progress.advance_by(1.0, [&](Progress& part) { light.gather(coarse, settings, second, part); });
+    progress.finish();
     return {first.rays_of, second.rays_of};
 }
 

@@ -8,6 +8,7 @@ from _native_test import irradiance
 from beamspread.core.bake import spread_light
 from beamspread.core.bake.bake_settings import BakeSettings
 from beamspread.core.material import Material
+from beamspread.core.messages import Level
 from beamspread.core.native import native
 from beamspread.core.scene.illumination import Illumination
 from beamspread.core.scene.lights import SunLight, WorldLight
@@ -107,6 +108,21 @@ def test_two_suns():
     assert lights[1].strength > lights[2].strength
     assert Illumination(lights).lights == lights  # nothing is left to divide
     assert Illumination([]).lit_by([world(image)]).lights[1:] == lights[1:]
+
+
+def test_a_world_of_nothing_but_a_sun_is_a_sun():
+    image = disk(direction(2.0, 0.8), math.radians(0.5), (3e4,) * 3, sky=(0.0, 0.0, 0.0))
+    assert [type(light) for light in Illumination([world(image)]).lights] == [SunLight]
+
+
+def test_a_bake_says_that_a_sun_is_a_disk():
+    """Other worlds and suns need no words."""
+    light = world(disk(direction(2.0, 0.8), math.radians(0.5), (3e4,) * 3))
+    for illumination in (Illumination([light]), Illumination([]).lit_by([light])):
+        ((level, text),) = [(message.level, message.text) for message in illumination.messages]
+        degrees = math.degrees(illumination.lights[1].angle)
+        assert (level, text) == (Level.INFO, f"The sun in 'Sky' is baked as a disk of {degrees:.2g}°.")
+        assert Illumination(illumination.lights).messages == ()
 
 
 def test_a_sky_needs_few_terms(monkeypatch):

@@ -200,7 +200,7 @@ class BakeJob:
         lights = [light for light in self.illumination.lights if not all(light.is_behind(back) for back in backs)]
         if not lights:
             return []
-        names = ", ".join(f"'{light.name}'" for light in lights)
+        names = ", ".join(dict.fromkeys(f"'{light.name}'" for light in lights))  # a world's sun has its name
         text = f"Light that reaches the back of '{self.name}' is left out, since LDF samples know one side: {names}."
         return [warning(self.name, text, "Set Distributions to Library.")]
 

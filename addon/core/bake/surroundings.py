@@ -123,8 +123,9 @@ def surroundings_of(
 
 
 def _shares(grid: AnyGrid, illumination: Illumination) -> Shares:
-    """`Shares` of the brightest lights with a size, and of an even sky."""
-    lights = sorted((light for light in illumination.lights if light.has_size), key=lambda light: -light.strength)
+    """`Shares` of the brightest lights with a size but narrow suns, and of an even sky."""
+    wide = [light for light in illumination.lights if light.has_size and not light.is_parallel]
+    lights = sorted(wide, key=lambda light: -light.strength)
     shares = {}
     for name, light in [(SKY, _sky()), *((light.name, light) for light in lights[:MAX_LIGHTS])]:
         shown, arriving = (

@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from copy import copy
 
 import numpy as np
 
-from ..messages import Message, Messages
+from ..messages import Message, Messages, note
 from .bent_grid import AnyGrid
-from .lights import FieldLight, Light, WorldLight
+from .lights import FieldLight, Light, SunLight, WorldLight
 from .occluders import Mesh, Occluder, build
 
 # Distance of the origins that shadows are traced relative to, texels; up to twice as far. Larger values let more
@@ -41,10 +41,10 @@ class Illumination:
         untraceable: str = "",
     ) -> None:
         """`max_crossings`: number of see-through surfaces that light crosses before it ends at the next; None: any."""
-        self.lights = tuple(_divided(lights))
+        self.lights, suns = _divided(lights)
         self.by_cycles, self.receivers = dict(by_cycles or {}), dict(receivers or {})
         self.untraceable = untraceable
-        self._messages = tuple(messages)
+        self._messages = (*messages, *suns)
         self._occluders = (Occluder("", occluders),) if isinstance(occluders, Mesh) else tuple(occluders or ())
         self._max_crossings = max_crossings
         # Native occluders by origin and names of blockers; all have the same origin.
@@ -88,8 +88,9 @@ class Illumination:
 
     def lit_by(self, lights: Sequence[Light]) -> Illumination:
         """A copy with more lights."""
-        more = copy(self)
-        more.lights = (*self.lights, *_divided(lights))
+        divided, suns = _divided(lights)
+        more = self.with_messages(*suns)
+        more.lights = (*self.lights, *divided)
         return more
 
     def native_lights(self, grid: AnyGrid) -> list[tuple]:
@@ -174,7 +175,14 @@ class Illumination:
         return self._casters[origin, chosen]
 
 
-def _divided(lights: Iterable[Light]) -> Iterator[Light]:
-    """The lights, with the suns of worlds apart."""
+def _divided(lights: Iterable[Light]) -> tuple[tuple[Light, ...], list[Message]]:
+    """The lights, with the suns of worlds apart, and notes that name these."""
+    divided, notes = [], []
     for light in lights:
-        yield from light.parts() if isinstance(light, WorldLight) else (light,)
+        parts = light.parts() if isinstance(light, WorldLight) else (light,)
+        divided += parts
+        for part in parts:
+            if part is not light and isinstance(part, SunLight):
+                degrees = math.degrees(part.angle)
+                notes.append(note("", f"The sun in '{part.name}' is baked as a disk of {degrees:.2g}°."))
+    return tuple(divided), notes

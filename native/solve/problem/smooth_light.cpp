@@ -54,7 +54,7 @@ public:
             });
         }
 
-        // Those of the next harmonic, [texel][angle].
+        // Writes the moments of the next harmonic, [texel][angle].
         void next(Moments& cosine, Moments& sine)
         {
             const std::size_t texels = m_of.m_rays.texels;

@@ -8,8 +8,8 @@ namespace beamspread {
 
 namespace {
 
-// Fraction of the tolerance that errors of smooth light may use, root mean square over the plane and relative to the mean
-// of all light. Larger: fewer terms, larger errors.
+// Fraction of the tolerance that errors of smooth light may use, root mean square over the plane and relative to
+// `ComingLight::irradiance`. Larger: fewer terms, larger errors.
 constexpr double smooth_budget = 0.05;
 
 // Error of the radiance without a term of harmonic m, per moment: light that is even within a kernel's reach cancels in
@@ -19,7 +19,7 @@ double error_of(std::size_t m)
     return m == 0 ? 1.0 : 0.5 / static_cast<double>(m);
 }
 
-// What is lost without a term, at the angles of smooth light.
+// `KernelDecomposition::function` of a term at the angles of smooth light.
 std::array<double, SmoothLight::angles> function_of(const KernelDecomposition& kernels, std::size_t term)
 {
     std::array<double, SmoothLight::angles> values{};

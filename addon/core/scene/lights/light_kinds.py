@@ -249,7 +249,7 @@ class WorldLight(Light):
         return self._radiance_fault(self.radiance) or super().fault()
 
     def parts(self) -> tuple[Light, ...]:
-        """The light without the suns in its image, and these; itself if there are none.
+        """The light without the suns in its image, if that is not dark, and these; itself if there are none.
 
         A sun has few directions, and shadows far sharper than the sky's. As a light of its own it takes fewer rays, and
         one kernel.
@@ -266,7 +266,8 @@ class WorldLight(Light):
             suns.append(
                 SunLight(self.name, self.strength * strength, color, self.cast_shadow, travel, spot.angle, **shared)
             )
-        return (replace(self, radiance=divided[0]), *suns)
+        rest = (replace(self, radiance=divided[0]),) if divided[0].any() else ()
+        return (*rest, *suns)
 
     def coarse(self, max_rows: int) -> WorldLight:
         """The light with means of texels, so that its image has at most this many rows."""

@@ -7,8 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-# Half the angle of the largest spot, radians: the axis of native `SunLight`'s widest cone stands for all its directions
-# inside a medium.
+# Half the angle of the largest spot, radians: half of native `SunLight.max_parallel_angle`, so that it has one kernel.
 REACH = math.radians(1.0)
 
 # Steps from the brightest texel to the middle of a spot. More: larger spots are found whole.
