@@ -57,7 +57,7 @@ def add_hair():
 
 MISPLACED = [
     (add_grouped, "Grouped", ["'Grouped' has one image, but its node group 'Outer'", "Ctrl Alt G"]),
-    (add_instances, "Shown", ["'Shown' has 2 instances", "Make Instances Real", "Make Single User"]),
+    (add_instances, "Shown", ["'Shown' has 2 instances", "Make Instances Real", "Object & Data & Materials"]),
     (add_metaball, "Ball", ["'Ball' is not a mesh", "Convert"]),
     (add_volume, "Smoke", ["'Smoke' is a volume, which has no faces. Give the node to a mesh."]),
     (add_hair, "Fur", ["'Fur' is hair, which has no faces. Give the node to a mesh."]),

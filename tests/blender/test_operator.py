@@ -25,6 +25,7 @@ from scenes import (
     add_sun,
     bake,
     file_image,
+    image_of,
     messages_of,
     node_of,
     pixels,
@@ -240,6 +241,27 @@ def test_two_objects_on_the_same_part_of_an_image():
     add_sun(0)
     select(*planes)
     assert "same part of the image 'Shared'" in messages_of(bpy.ops.beamspread.bake)
+
+
+@pytest.mark.parametrize("way", ["single user", "atlas"])
+def test_objects_of_one_mesh_get_images_by_each_way_out_that_is_named(way):
+    first = add_plane("A", material=add_material())
+    second = bpy.data.objects.new("B", first.data)
+    second.location.x = 5
+    bpy.context.collection.objects.link(second)
+    add_sun(0)
+    select(first, second)
+    message = messages_of(bpy.ops.beamspread.bake)
+    assert "Give 'B' a material of its own (Object > Relations > Make Single User > Object & Data & Mat" in message
+    assert "or make One Atlas for the Selection" in message
+    assert "move its UVs" not in message
+    if way == "single user":
+        select(second)
+        bpy.ops.object.make_single_user(object=True, obdata=True, material=True)
+    else:
+        bpy.ops.beamspread.make_atlas()
+    assert messages_of(bpy.ops.beamspread.bake) == ""
+    assert (image_of(first) == image_of(second)) == (way == "atlas")
 
 
 def hidden(plane):

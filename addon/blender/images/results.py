@@ -158,8 +158,7 @@ class Results:
                     image.name,
                     f"'{owner.object_name}' and '{target.object_name}' share a material and have different UV maps: "
                     f"only '{target.object_name}' shows its bake.",
-                    f"Give '{target.object_name}' a material of its own (Object > Relations > Make Single User > "
-                    "Materials).",
+                    f"{own_material(target.object_name)}.",
                 )
 
     def _store_beside(self, node, bake: Bake, layer: str, texture: np.ndarray) -> str:
@@ -243,9 +242,27 @@ class Results:
                 raise BakeError(
                     f"'{owner.object_name}' is baked to the same part of the image '{image.name}' by the same "
                     "material.",
-                    f"Give '{target.object_name}' a material of its own (Object > Relations > Make Single User > "
-                    "Materials), or move its UVs.",
+                    f"{own_material(target.object_name)}, or {_own_place(target.object_name)}.",
                 )
+
+
+def own_material(name: str) -> str:
+    """The beginning of a sentence on how an object gets a material of its own."""
+    parts = "Object & Data & Materials" if _shares_mesh(name) else "Materials"
+    return f"Give '{name}' a material of its own (Object > Relations > Make Single User > {parts})"
+
+
+def _own_place(name: str) -> str:
+    """The end of a sentence on how an object gets a place of its own in an image."""
+    if _shares_mesh(name):  # and its UVs
+        return "make One Atlas for the Selection (Properties > Render > Beamspread > New Images)"
+    return "move its UVs"
+
+
+def _shares_mesh(name: str) -> bool:
+    """True if other objects have the mesh of an object, and so its materials and UVs."""
+    obj = bpy.data.objects.get(name)
+    return obj is not None and obj.data is not None and obj.data.users - obj.data.use_fake_user > 1
 
 
 def _size_in(image, bake: Bake) -> Size:

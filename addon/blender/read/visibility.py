@@ -258,7 +258,7 @@ def check_instance(name: str, instance: ObjectInstance | None, view_layer) -> No
         raise BakeError(
             f"The object '{name}' has {instance.count} instances and one image, which can't show "
             "the light of all: make them real (Object > Apply > Make Instances Real) and give each a material of its "
-            "own (Object > Relations > Make Single User > Materials), or hide all but one from render."
+            "own (Object > Relations > Make Single User > Object & Data & Materials), or hide all but one from render."
         )
 
 
