@@ -9,6 +9,7 @@ import bpy
 import numpy as np
 import pytest
 from beamspread.blender.jobs.run.bake_run import BakeThread
+from beamspread.blender.jobs.state import state
 from beamspread.blender.settings import BeamspreadSettings
 from beamspread.core.bake.bake_settings import COMBINED
 from beamspread.core.bake.layers import LAYERS
@@ -241,6 +242,22 @@ def test_two_objects_on_the_same_part_of_an_image():
     add_sun(0)
     select(*planes)
     assert "same part of the image 'Shared'" in messages_of(bpy.ops.beamspread.bake)
+
+
+def test_objects_of_one_material_share_a_new_image_whatever_their_proportions():
+    bpy.context.scene.beamspread.use_size, bpy.context.scene.beamspread.resolution = False, 64
+    material = add_material()
+    corner, beside = np.array([(0, 0), (0.4, 0), (0.4, 0.4), (0, 0.4)]), (0.5, 0.5)
+    square = add_plane("Square", (1, 1), uvs=corner, material=material)
+    long = add_plane("Long", (2, 1), Matrix.Translation((5, 0, 0)), corner + beside, material)
+    add_sun(0)
+    together, _ = bake(square, long)
+    assert not any("resized" in line for line in state.lines())
+    assert together.shape == (32, 64, 3)  # as the one with the longer side has them, square
+    assert together[:12, :24].all()
+    assert together[18:28, 34:56].all()
+    again, _ = bake(square, long)
+    assert np.array_equal(together, again)
 
 
 @pytest.mark.parametrize("way", ["single user", "atlas"])

@@ -5,7 +5,7 @@ Rows of all arrays run up: row 0 is the bottom (v = 0), as Blender stores images
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -120,9 +120,12 @@ class Receiver:
         return texture
 
 
-def texture_size(mesh: FlatMesh, resolution: int) -> tuple[int, int]:
-    """Width and height of a texture with `resolution` texels along the longer side; texels are nearly square."""
-    lengths = np.max([island.lengths for island in mesh.islands], axis=0).tolist()
+def texture_size(mesh: FlatMesh, resolution: int, beside: Iterable[FlatMesh] = ()) -> tuple[int, int]:
+    """Width and height of a texture with `resolution` texels along the longer side; texels are nearly square.
+
+    Meshes `beside` it have their places in the same texture.
+    """
+    lengths = np.max([island.lengths for one in (mesh, *beside) for island in one.islands], axis=0).tolist()
     return tuple(max(1, round(resolution * length / max(lengths))) for length in lengths)
 
 

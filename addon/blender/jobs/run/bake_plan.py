@@ -200,6 +200,7 @@ def read_scene(
     resolution: int | None = None,
     check: Check | None = None,
     indirect: bool | None = None,
+    fills_nodes: bool = False,
 ) -> list[Plan]:
     """Read the targets in the scene as it would render at its current frame.
 
@@ -208,6 +209,7 @@ def read_scene(
     resolution : texels along the longer side; None keeps the size of the node's image, or follows the scene's settings
         where there is none.
     indirect : True if light may bounce; None: as the scene's settings say.
+    fills_nodes : True if the results fill the nodes' images, False if they go to files.
     """
     view_layer = context.view_layer
     _update_nodes(context.evaluated_depsgraph_get())
@@ -218,6 +220,7 @@ def read_scene(
             depsgraph = context.evaluated_depsgraph_get()
         scene_cache.check_images()
         options = {"cache": scene_cache, "check": check, "indirect": indirect, "maps": maps}
+        options["fills_nodes"] = fills_nodes
         plans = read_plans(depsgraph, targets, visible, resolution, **options)
     if not context.scene.beamspread.use_live:
         scene_cache.drop_arrays()
@@ -263,13 +266,14 @@ def read_plans(
     check: Check | None = None,
     indirect: bool | None = None,
     maps: Mapping[str, Outcome] | None = None,
+    fills_nodes: bool = False,
 ) -> list[Plan]:
     """Read the targets and the light of a depsgraph, which is not needed afterwards.
 
     Parameters
     ----------
     visible : names of the objects that render; None: all.
-    resolution, indirect : as for `read_scene`.
+    resolution, indirect, fills_nodes : as for `read_scene`.
     size : width and height of the texture, overrides all other sizes.
     copy : copy of the scene for Cycles, if there is one already. Else the first job that needs one makes it.
     cache : results of earlier reads, for a depsgraph of the viewport; None: everything is read.
@@ -305,7 +309,7 @@ def read_plans(
             receiving, settings = receivers[target], depsgraph.scene.beamspread
             mesh, chosen = receiving.mesh, size
             if size is None:
-                mesh, chosen = sized(receiving, receivers.values(), resolution, settings)
+                mesh, chosen = sized(receiving, receivers.values(), resolution, settings, fills_nodes)
             plans[target] = _plan(receiving, mesh, chosen, light, check)
 
     try:

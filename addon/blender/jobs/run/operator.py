@@ -69,7 +69,7 @@ class BEAMSPREAD_OT_bake(RunOperator, bpy.types.Operator):
         state.forget_failures()
         for bake in misplaced:
             self._run.end(bake)
-        plans = read_scene(context, targets)
+        plans = read_scene(context, targets, fills_nodes=True)
         parts = stale.parts_of(context, targets)  # with the UV maps that the reader makes
         self._run.take(steps_of(plans, context.scene.beamspread.for_bake(), preview_first=in_window), parts)
         return True

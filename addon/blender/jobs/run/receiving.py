@@ -50,11 +50,15 @@ def read_receiver(target: Target, instance: ObjectInstance, fills_image: bool, o
 
 
 def sized(
-    receiving: Receiving, together: Iterable[Receiving], resolution: int | None, settings: BeamspreadSettings
+    receiving: Receiving,
+    together: Iterable[Receiving],
+    resolution: int | None,
+    settings: BeamspreadSettings,
+    fills_nodes: bool,
 ) -> tuple[FlatMesh, tuple[int, int]]:
     """The mesh with its UDIM tiles, and width and height of its texture.
 
-    Targets of one material without an image will share a new one.
+    If the results fill the nodes' images, targets of one material without an image will share a new one.
     """
     target, image, mesh = receiving.target, receiving.target.image, receiving.mesh
     sharing = [item for item in together if item.target.name.image_key == target.name.image_key]
@@ -66,7 +70,8 @@ def sized(
         return mesh, size_of_frames(image) if is_sequence(image) else tuple(image.size)
     is_textured = target.node.has_texture()
     sides = (settings.side_for(length_of(item.mesh), item.surface, is_textured, item.mesh.is_bent) for item in sharing)
-    return mesh, texture_size(mesh, resolution or max(sides))
+    beside = [item.mesh for item in sharing] if fills_nodes else []
+    return mesh, texture_size(mesh, resolution or max(sides), beside)
 
 
 def _tile_sizes(
