@@ -290,6 +290,7 @@ def test_tiles_of_another_scene_stay(tmp_path):
     scenes.select(quads)
     assert bpy.ops.beamspread.bake() == {"FINISHED"}
     bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "first.blend"))
+    assert scenes.image_of(quads).filepath == "//Quads_Medium.<UDIM>.exr"
     before = {path: path.read_bytes() for path in tmp_path.glob("*.exr")}
     bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "second.blend"))
     bpy.data.objects["Lamp"].location.x = -0.5

@@ -165,8 +165,7 @@ def check_folder() -> None:
 def _show_files(image, path: Path, tiling: Tiling) -> None:
     """Have the image show the files of all of its tiles and of these."""
     wanted = {tile.number for tile in image.tiles} | set(tiling.sizes)
-    if file_of(image) != path:
-        point_to(image, path)
+    point_to(image, path)  # Blender makes the path of a new tiled image absolute
     for number in sorted(wanted - {tile.number for tile in image.tiles}):
         image.tiles.new(tile_number=number)
     icons.reload(image)
