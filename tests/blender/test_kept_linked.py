@@ -11,9 +11,9 @@ from beamspread.core.target import Target
 from mathutils import Matrix
 
 
-def link_from_library(folder):
+def link_from_library(folder, uvs=scenes.SQUARE_UVS):
     """Link a plane with a material, and a sun, from another file; the plane."""
-    scenes.add_plane(material=scenes.add_material())
+    scenes.add_plane(uvs=uvs, material=scenes.add_material())
     scenes.add_sun(0)
     path = scenes.save_scene(folder)
     bpy.ops.wm.read_factory_settings(use_empty=True)
@@ -44,6 +44,17 @@ def test_a_linked_material_is_refused_before_the_bake(tmp_path):
     scenes.bake(plane)
     scenes.reopen(tmp_path, "user.blend")
     assert scenes.pixels(scenes.image_of(bpy.data.objects["Plane"])).any()
+
+
+def test_a_linked_object_without_a_uv_map_is_refused_and_the_sentence_helps(tmp_path):
+    plane = link_from_library(tmp_path, None)
+    scenes.select(plane)
+    message = scenes.messages_of(bpy.ops.beamspread.bake)
+    assert "The mesh has no UV map. 'Plane' belongs to another .blend file" in message
+    assert "Make Local > Selected Objects, Data and Materials" in message
+    bpy.ops.object.make_local(type="SELECT_OBDATA_MATERIAL")
+    (texture,) = scenes.bake(bpy.data.objects["Plane"])
+    assert texture.any()
 
 
 def test_an_overridden_material_is_refused_and_the_sentence_helps(tmp_path):

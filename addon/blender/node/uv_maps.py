@@ -106,7 +106,9 @@ def _make(depsgraph, name: str, targets: list[Target], problem: str) -> Outcome:
     mesh = obj.data
     if obj.library or obj.override_library or mesh.library or mesh.override_library:
         text = f"{problem} '{name}' belongs to another .blend file, so it can't get a map of its own."
-        return ReceiverError(text, "Make it local (Object > Relations > Make Local > Selected Objects and Data).")
+        return ReceiverError(
+            text, "Make it local (Object > Relations > Make Local > Selected Objects, Data and Materials)."
+        )
     if mesh.is_editmode:
         obj.update_from_editmode()
     before = _make_before_subdivision(depsgraph, obj, targets)
