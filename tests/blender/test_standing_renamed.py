@@ -56,7 +56,7 @@ def test_a_renamed_original_names_the_copy_beside_it():
         stale.refresh(bpy.context)
         (row,) = [row for target, row in state.rows.items() if target.object_name == "Renamed"]
         names = [f"'Copy {n}'" for n in range(number + 1)]
-        words = ", ".join(names[:3]) + (f" and {number - 2} more objects" if number > 2 else "")
+        words = ", ".join(names[:3]) + ["", "", "", " and 1 more object", " and 2 more objects"][number]
         assert (row.status, row.messages[0].text) == (Status.STALE, f"Changed since its bake: {words}.")
     for copy in copies:
         bpy.data.objects.remove(copy)

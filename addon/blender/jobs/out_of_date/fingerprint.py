@@ -93,7 +93,8 @@ def changed_objects(before: str, now: Parts) -> str:
     changed = sorted(name for number, name in now.objects.items() if number not in known.split(" "))
     if not changed:
         return "removed or hidden objects"
-    more = f" and {len(changed) - MAX_NAMED} more objects" if len(changed) > MAX_NAMED else ""
+    rest = len(changed) - MAX_NAMED
+    more = f" and {rest} more object{'s' if rest > 1 else ''}" if rest > 0 else ""
     return ", ".join(f"'{name}'" for name in changed[:MAX_NAMED]) + more
 
 
