@@ -1,10 +1,11 @@
-// Python names of native/image: write_exr, read_exr, read_exr_header.
+// Python names of native/image: write_exr, read_exr, read_exr_header, fill_rings, fill_margin.
 #include "image/exr.h"
 
 #include <algorithm>
 #include <optional>
 
 #include "base/error.h"
+#include "image/margin.h"
 #include "python/casters.h"
 
 namespace beamspread {
@@ -113,6 +114,44 @@ py::list read_exr_header(const std::string& path)
     return result;
 }
 
+// A texture that is written.
+Texture texture_of(const py::array& array)
+{
+    if (!py::isinstance<Array<float>>(array) || array.ndim() != 3 || !array.writeable())
+        reject("texture", shape_text(array), "contiguous, writable float32 (H, W, C)");
+    return {static_cast<float*>(py::array(array).mutable_data()), side(array, 0), side(array, 1), side(array, 2)};
+}
+
+// Values of a texture's texels.
+template <class T>
+const T* of_texels(const std::string& name, const py::array& array, const Texture& texture, const std::string& allowed)
+{
+    const bool fits = py::isinstance<Array<T>>(array) && array.ndim() == 2 && side(array, 0) == texture.height &&
+                      side(array, 1) == texture.width;
+    if (!fits)
+        reject(name, shape_text(array), "contiguous " + allowed + " (H, W) like the texture");
+    return static_cast<const T*>(array.data());
+}
+
+void fill_rings(const py::array& array, const py::array& known, std::size_t count)
+{
+    const Texture texture = texture_of(array);
+    const auto* const is_known =
+        reinterpret_cast<const std::uint8_t*>(of_texels<bool>("known", known, texture, "bool"));
+    const py::gil_scoped_release release;
+    Rings(texture, nullptr).add(is_known, count);
+}
+
+void fill_margin(const py::array& array, const py::array& coverage, std::size_t margin, float whole, std::size_t border,
+                 const std::optional<py::array>& labels)
+{
+    const Texture texture = texture_of(array);
+    const float* const part = of_texels<float>("coverage", coverage, texture, "float32");
+    const std::int32_t* const islands = labels ? of_texels<std::int32_t>("labels", *labels, texture, "int32") : nullptr;
+    const py::gil_scoped_release release;
+    extend_margin(texture, part, islands, margin, whole, border);
+}
+
 }  // namespace
 
 void bind_image(py::module_& m)
@@ -179,6 +218,46 @@ Raises
 ------
 OSError
     The file is missing, or `read_exr` would refuse its header.
+)");
+    m.def("fill_rings", &fill_rings, py::arg("texture"), py::arg("known"), py::arg("count"),
+          R"(Fill rings of texels around the known ones with the mean of their known neighbors.
+
+Parameters
+----------
+texture : ndarray, float32, shape (H, W, C), C-contiguous
+    Is changed.
+known : ndarray, bool, shape (H, W), C-contiguous
+count : int
+    Number of rings.
+
+Raises
+------
+ValueError
+    An argument is of the wrong shape or dtype.
+)");
+    m.def("fill_margin", &fill_margin, py::arg("texture"), py::arg("coverage"), py::arg("margin"), py::arg("whole"),
+          py::arg("border"), py::arg("labels") = py::none(),
+          R"(Fill rings of texels around the islands of a texture, each with the mean of its island beside it.
+
+Parameters
+----------
+texture : ndarray, float32, shape (H, W, C), C-contiguous
+    Is changed, but for texels with a coverage above 0.
+coverage : ndarray, float32, shape (H, W), C-contiguous
+    Fraction of each texel inside the islands.
+margin : int
+    Number of rings.
+whole : float
+    Rings continue texels with a coverage above this, if there are any nearby.
+border : int
+    Texels within which these count as nearby.
+labels : ndarray, int32, shape (H, W), C-contiguous, optional
+    Island of each texel, below 0 for none; without, all belong to the same.
+
+Raises
+------
+ValueError
+    An argument is of the wrong shape or dtype.
 )");
 }
 

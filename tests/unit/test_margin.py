@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from beamspread.core.bake.margin import extend_margin, part_in_shared
+from beamspread.core.bake.margin import NEIGHBOURS, STRAIGHT, WHOLE, extend_margin, fill_margin, part_in_shared
 from beamspread.core.native import native
 
 
@@ -85,6 +85,82 @@ def test_texels_across_an_edge_continue_their_own_island():
     above = extend_margin(texture, coverage, 1, labels)[0]
     np.testing.assert_allclose(above[:4], np.tile(np.float32([0, 7]), (4, 1)), rtol=1e-6)
     np.testing.assert_allclose(above[4:], np.tile(np.float32([5, 0]), (4, 1)), rtol=1e-6)
+
+
+def one_ring(values: dict, islands: dict, shape: tuple[int, int]) -> tuple[dict, dict]:
+    """Values and islands of the texels beside known ones, texel by texel; known are those of `values`."""
+    found, continued = {}, {}
+    for texel in np.ndindex(shape):
+        if texel in values:
+            continue
+        beside = [((texel[0] + dy, texel[1] + dx), (dy, dx) in STRAIGHT) for dy, dx in NEIGHBOURS]
+        beside = [(other, is_straight) for other, is_straight in beside if other in values]
+        own = islands[texel]
+        for is_first in (True, False):
+            candidates = [islands[other] for other, is_straight in beside if is_straight == is_first]
+            own = min(candidates) if own is None and candidates else own
+        same = [values[other] for other, _ in beside if islands[other] == own]
+        if same:
+            found[texel], continued[texel] = np.mean(same, axis=0), own
+    return found, continued
+
+
+def rings(values: dict, islands: dict, shape: tuple[int, int], count: int) -> dict:
+    """`values` with those of `count` rings around them."""
+    values, islands = dict(values), dict(islands)
+    for _ in range(count):
+        found, continued = one_ring(values, islands, shape)
+        values.update(found)
+        islands.update(continued)
+    return values
+
+
+@pytest.mark.parametrize("seed", range(8))
+def test_rings_around_islands_of_any_shape_follow_their_definition(seed):
+    rng, shape = np.random.default_rng(seed), (15, 18)
+    coverage, labels = np.zeros(shape, np.float32), np.full(shape, -1, np.int32)
+    for label in range(5):
+        row, column = rng.integers(0, 14, 2)
+        part = slice(row, row + 4), slice(column, column + 4)
+        is_inside = rng.random(coverage[part].shape) < 0.8
+        cut = np.where(rng.random(is_inside.shape) < 0.5, 1, rng.random(is_inside.shape))
+        coverage[part], labels[part] = np.where(is_inside, cut, 0), np.where(is_inside, label, -1)
+    texture = rng.random((*shape, 3), np.float32)
+    islands = {texel: labels[texel] if labels[texel] >= 0 else None for texel in np.ndindex(shape)}
+    own = {texel: texture[texel] for texel in np.ndindex(shape)}
+    whole = rings({texel: own[texel] for texel in own if coverage[texel] > WHOLE}, islands, shape, 2)
+    baked = {texel: whole.get(texel, own[texel]) for texel in own if coverage[texel] > 0}
+    expected = {**own, **rings(baked, islands, shape, 3), **{texel: own[texel] for texel in baked}}
+    extended = extend_margin(texture, coverage, 3, labels)
+    for texel in own:  # sums of up to eight float32 values, ring after ring
+        assert extended[texel] == pytest.approx(expected[texel], rel=1e-5), texel
+
+
+def test_margins_in_place_are_those_of_a_copy_in_wide_and_narrow_parts_of_an_image():
+    rng = np.random.default_rng(4)
+    for columns in (slice(3, 9), slice(3, 60)):
+        coverage = np.zeros((20, 64), np.float32)
+        coverage[5:9, columns] = 1
+        texture = rng.random((20, 64, 3), np.float32)
+        extended = extend_margin(texture, coverage, 2)
+        assert (extended != texture).any(axis=-1).sum() == 8 * (columns.stop - columns.start + 4) - coverage.sum()
+        fill_margin(texture, coverage, 2)
+        np.testing.assert_array_equal(texture, extended)
+
+
+def test_textures_that_cannot_be_filled_are_refused():
+    texture, coverage = np.zeros((4, 5, 3), np.float32), np.ones((4, 5), np.float32)
+    with pytest.raises(ValueError, match=r"'texture' is float64 .*writable float32 \(H, W, C\)"):
+        native.fill_margin(texture.astype(float), coverage, 1, WHOLE, 2)
+    with pytest.raises(ValueError, match=r"'coverage' is .*\(5, 4\)"):
+        native.fill_margin(texture, coverage.reshape(5, 4), 1, WHOLE, 2)
+    with pytest.raises(ValueError, match=r"'labels' is int64"):
+        native.fill_margin(texture, coverage, 1, WHOLE, 2, np.zeros((4, 5), np.int64))
+    with pytest.raises(ValueError, match=r"'known' is float32"):
+        native.fill_rings(texture, coverage, 1)
+    texture.flags.writeable = False
+    with pytest.raises(ValueError, match="writable"):
+        native.fill_rings(texture, coverage > 0, 1)
 
 
 def test_parts_of_a_shared_image_are_the_same_whichever_is_baked():

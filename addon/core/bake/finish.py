@@ -16,7 +16,7 @@ from ..scene.receiver import Receiver
 from ..scene.sampling import bilinear
 from ..scene.seams import find_seams
 from .bake_settings import ADJACENT_FACES, COMBINED, BakeSettings
-from .margin import BORDER_RINGS, WHOLE, add_rings, extend_margin
+from .margin import BORDER_RINGS, WHOLE, add_rings, fill_margin
 
 
 def finished_texture(
@@ -27,7 +27,7 @@ def finished_texture(
         has_seams, pairs = receiver.seams is not None, zip(values, receiver.charts)
         values = [_with_rims(on_grid, chart, material, has_seams) for on_grid, chart in pairs]
     texture = receiver.to_texture(values)
-    texture = extend_margin(texture, receiver.coverage, settings.margin, receiver.labels())
+    fill_margin(texture, receiver.coverage, settings.margin, receiver.labels())
     return texture if receiver.seams is None else from_adjacent_faces(texture, receiver, values, settings.margin)
 
 
