@@ -11,7 +11,7 @@ import numpy as np
 from ..errors import ReceiverError
 from ..messages import Message, note, warning
 from .ears import triangle_corners
-from .islands import NO_AREA_REMEDY, NO_UV_AREA, connected_in_map
+from .islands import NO_UV_AREA, UNWRAP, connected_in_map
 from .planes import FLATNESS_TOLERANCE, NO_AREA_BESIDE
 from .polygons import Polygons, same_faces
 from .sheet import bodies_of, closed_bodies
@@ -70,7 +70,7 @@ def bent_part(polygons: Polygons) -> BentPart:
     """
     is_shown = (polygons.uv_areas > NO_UV_AREA) & (polygons.areas > NO_AREA_BESIDE * polygons.areas.max())
     if not is_shown.any():
-        raise ReceiverError("The UV map has no area, in all or some of the faces.", NO_AREA_REMEDY)
+        raise ReceiverError("The UV map has no area in any face.", UNWRAP)
     islands = []
     for tile, part in polygons.of_faces(np.flatnonzero(is_shown)).by_tile().items():
         pieces, (corners, owners) = connected_in_map(part), triangle_corners(part, np.arange(part.count))
@@ -150,17 +150,20 @@ def _faults(polygons: Polygons, name: str) -> list[Message]:
     # Neighbors run along their common edge in opposite directions, unless a normal tells that a face is mirrored.
     looks = np.sign(np.einsum("ij,ij->i", _by_order(polygons), polygons.area_vectors))[polygons.face_of]
     is_same_way = polygons.points[first] == polygons.points[second]
-    is_wrong = is_same_way == (looks[first] == looks[second])
+    # Where more than two faces meet, as where bodies touch or lie on each other, some of them look to other sides.
+    meetings = np.bincount(np.concatenate([first, second]), minlength=len(looks))
+    is_wrong = (is_same_way == (looks[first] == looks[second])) & (meetings[first] == 1) & (meetings[second] == 1)
     if is_wrong.sum() > MIN_FAULT * len(first):
         text = f"Faces of '{name}' that touch look to opposite sides, at {is_wrong.sum()} of {len(first)} edges."
-        remedy = "Light can't be right there. Recalculate the normals (Edit Mode: Shift N)."
+        remedy = "Light can't be right there. Recalculate the normals (Edit Mode: Shift N), or check modifiers."
         messages.append(warning(name, text, remedy))
     counts = np.bincount(same_faces(polygons))
     is_double = counts[same_faces(polygons)] > 1
     part = polygons.areas[is_double].sum() / polygons.areas.sum()
     if part > MIN_FAULT:
         text = f"Faces of '{name}' lie on each other, {part:.0%} of its surface: light counts for each of them there."
-        messages.append(warning(name, text, "Merge them (Edit Mode: A, then M, By Distance)."))
+        remedy = "Check the object's scale and modifiers, or merge them (Edit Mode: A, then M, By Distance)."
+        messages.append(warning(name, text, remedy))
     return messages
 
 
