@@ -73,8 +73,26 @@ def test_a_chosen_map_that_does_not_fit_is_refused_and_no_map_is_made(plane):
     plane.data.update()
     node_of(plane).uv_map = "Second"
     scenes.select(plane)
-    assert "reaches outside the image" in scenes.messages_of(bpy.ops.beamspread.bake)
+    message = scenes.messages_of(bpy.ops.beamspread.bake)
+    assert "reaches outside the image" in message
+    assert "If the node's UV Map is empty, Beamspread's own Bake makes a map." in message
     assert [layer.name for layer in plane.data.uv_layers] == ["UVMap", "Second"]
+    for layer in plane.data.uv_layers:
+        layer.data.foreach_set("uv", np.float32(np.multiply(RIGHT, 3)).ravel())
+    plane.data.update()
+    node_of(plane).uv_map = ""
+    assert bpy.ops.beamspread.bake() == {"FINISHED"}
+    assert [layer.name for layer in plane.data.uv_layers] == ["UVMap", "Second", OWN_MAP]
+
+
+def test_a_chosen_map_without_area_is_sent_to_a_bake(plane):
+    node_of(plane).uv_map = "Second"
+    scenes.select(plane)
+    plane.data.uv_layers["Second"].data.foreach_set("uv", np.zeros(8, np.float32))
+    plane.data.update()
+    message = scenes.messages_of(bpy.ops.beamspread.bake)
+    assert "The UV map has no area in any face." in message
+    assert message.strip().endswith("If the node's UV Map is empty, Beamspread's own Bake makes a map.")
 
 
 def test_another_choice_makes_the_bake_out_of_date(plane):

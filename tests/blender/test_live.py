@@ -385,4 +385,4 @@ def test_a_text_is_sent_to_a_bake_which_makes_its_map():
     settle()
     (said,) = [message.line() for message in timer.messages() if "no area" in message.line()]
     assert said.startswith("Text / Letters: ")
-    assert said.endswith("Beamspread's own Bake makes one.")
+    assert said.endswith("Beamspread's own Bake makes a map.")

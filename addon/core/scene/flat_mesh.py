@@ -11,7 +11,7 @@ from ..errors import ReceiverError
 from ..messages import Message, note, warning
 from .bent_part import BentIsland, BentPart, bent_part, facing_outward, lost_faces, lost_in_map
 from .ears import with_triangles
-from .islands import NO_AREA_REMEDY, NO_UV_AREA, Island, check_uvs, find_islands
+from .islands import NO_UV_AREA, UNWRAP, Island, check_uvs, find_islands
 from .planes import FLATNESS_TOLERANCE, FLATTENED, Plane, find_planes
 from .polygons import Polygons
 from .sheet import sheet_messages
@@ -124,7 +124,7 @@ def flatten(
     if not parts:
         if black:
             raise ReceiverError(black[0].text, black[0].remedy)
-        raise ReceiverError("The UV map has no area, in all or some of the faces.", NO_AREA_REMEDY)
+        raise ReceiverError("The UV map has no area in any face.", UNWRAP)
     messages += black
     part_lost = lost / sum(float(polygons.areas[plane.faces].sum()) for plane in planes)
     if part_lost > FLATNESS_TOLERANCE:

@@ -57,8 +57,11 @@ class Island:
         return abs(cosine) < FLATNESS_TOLERANCE
 
 
-NO_AREA_REMEDY = "Unwrap the mesh again. If the node's UV Map is empty, Beamspread's own Bake makes one."
-"""For a map without an area, as a text's; other uses than a bake, such as Live, make no map."""
+NEW_MAP = "If the node's UV Map is empty, Beamspread's own Bake makes a map."
+"""Other uses than a bake, such as Live, make no map."""
+
+UNWRAP = f"Unwrap the mesh again. {NEW_MAP}"
+UNWRAP_APART = f"Unwrap the mesh so that each face has its own place (UV > Smart UV Project). {NEW_MAP}"
 
 
 def check_uvs(uvs: np.ndarray | None) -> None:
@@ -66,12 +69,12 @@ def check_uvs(uvs: np.ndarray | None) -> None:
     if uvs is None or len(uvs) == 0:
         raise ReceiverError("The mesh has no UV map.", "Bake it: Beamspread's own Bake makes a UV map.")
     if not np.isfinite(uvs).all():
-        raise ReceiverError("The UV map has coordinates that are not numbers.", "Unwrap the mesh again.")
+        raise ReceiverError("The UV map has coordinates that are not numbers.", UNWRAP)
     low, high = uvs.min(), uvs.max()
     if low < -UV_TOLERANCE or high > 1 + UV_TOLERANCE:
         raise ReceiverError(
             f"The UV map reaches outside the image (coordinates from {low:.3g} to {high:.3g}).",
-            "Scale and move it to fit between 0 and 1.",
+            UNWRAP,
         )
 
 
@@ -83,13 +86,13 @@ def check_map(polygons: Polygons) -> None:
     if polygons.areas[is_lost].sum() > MAX_LOST * polygons.areas.sum():
         listed = "" if is_lost.all() else f": {polygons.listed(is_lost)}"
         text = f"The UV map has no area in {is_lost.sum()} of {polygons.count} faces{listed}."
-        raise ReceiverError(text, "Unwrap the mesh again.")
+        raise ReceiverError(text, UNWRAP)
     # A small map fills few texels of the probe.
     shown = sum(map(_shown, polygons.by_tile().values()))
     overlap = 1 - shown / max(float(sizes.sum()) * PROBE_SIDE**2, 1e-30)
     if overlap > MAX_OVERLAP:
         text = f"The UV map overlaps: {overlap:.0%} of it show several faces."
-        raise ReceiverError(text, "Unwrap the mesh so that each face has its own place (UV > Smart UV Project).")
+        raise ReceiverError(text, UNWRAP_APART)
 
 
 def _shown(polygons: Polygons) -> float:

@@ -20,7 +20,7 @@ from .bent_part import BentPart
 from .chart import EDGE_TOLERANCE, Chart, ChartIsland, in_chart
 from .flat_mesh import FlatMesh, FlatPart
 from .grid import Grid
-from .islands import Island
+from .islands import UNWRAP_APART, Island
 from .seams import Seams
 from .tiles import Place, Tiling
 
@@ -163,7 +163,7 @@ def _check_overlap(total: np.ndarray) -> None:
     overlap = (total > MAX_COVERAGE).sum() / max(in_chart(total).sum(), 1)
     if overlap > MAX_OVERLAP:
         text = f"The UV map overlaps: {overlap:.0%} of its texels show several faces."
-        raise ReceiverError(text, "Unwrap the mesh so that each face has its own place (UV > Smart UV Project).")
+        raise ReceiverError(text, UNWRAP_APART)
 
 
 def _bent_receiver(mesh: FlatMesh, width: int, height: int, owner: str) -> Receiver:
