@@ -233,6 +233,15 @@ class TestFrozenBakes:
         bpy.ops.beamspread.bake_animation()
         assert self.warnings() == []
 
+    def test_tiles_have_no_sequence_to_show(self, plane, tmp_path):
+        bpy.context.scene.beamspread.use_udim = True
+        scenes.bake(plane)
+        bpy.ops.beamspread.bake_animation()
+        assert len(list(tmp_path.rglob("Plane_Medium_000[345].1001.exr"))) == 3
+        text = "'Sun' changes with time, but 'Plane' shows one bake in all frames."
+        assert self.warnings() == [f"{text} {frozen.OF_TILES}"]
+        assert frozen.OF_TILES in panel()
+
     def test_nothing_is_said_without_a_bake_or_motion(self, plane):
         assert self.warnings() == []
         scenes.bake(plane)

@@ -17,6 +17,8 @@ from ..registration import all_or_nothing, handlers
 
 REMEDY = "Bake Animation bakes each frame (Render > Beamspread > Animation)."
 
+OF_TILES = "Blender shows no sequences of UDIM tiles: their frames are files for other programs."
+
 MAX_NAMES = 3
 """Number of names in a sentence."""
 
@@ -34,7 +36,9 @@ def frozen(scene, targets: list[Target]) -> tuple[Message, ...]:
     names, verb = _listed(moving), "changes" if len(moving) == 1 else "change"
     baked = _listed(list(dict.fromkeys(target.object_name for target in shown)))
     shows = "shows" if len({target.object_name for target in shown}) == 1 else "show"
-    return (warning(baked, f"{names} {verb} with time, but {baked} {shows} one bake in all frames.", REMEDY),)
+    is_tiled = [image_of(target).source == "TILED" for target in shown]
+    remedy = " ".join([REMEDY] * (not all(is_tiled)) + [OF_TILES] * any(is_tiled))
+    return (warning(baked, f"{names} {verb} with time, but {baked} {shows} one bake in all frames.", remedy),)
 
 
 def _listed(names: list[str]) -> str:
