@@ -13,7 +13,8 @@ from beamspread.blender.node.find import find_targets
 from mathutils import Matrix
 from panel_layout import panel
 
-DIFFUSE = "spreads over 0.78 texels, so this is a diffuse bake. Choose a Resolution of 64, then Resize."
+REMEDY = "Choose a Resolution of 64, and Resize the image if there is one."
+DIFFUSE = f"spreads over 0.78 texels, so this is a diffuse bake. {REMEDY}"
 
 
 @pytest.fixture(autouse=True)

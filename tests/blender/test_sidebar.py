@@ -10,11 +10,15 @@ from scenes import add_material, add_plane, add_sun, bake, select
 
 
 class Layout(panel_layout.Layout):
-    """Takes properties as well."""
+    """Takes properties and buttons as well."""
 
     def __init__(self):
         super().__init__()
-        self.properties = []
+        self.properties, self.buttons = [], []
+
+    def operator(self, *arguments, text="", **options):
+        self.buttons.append(text)
+        return super().operator(*arguments, **options)
 
     def prop(self, _data, name, **_options):
         self.properties.append(name)
@@ -29,11 +33,13 @@ def test_it_has_live_the_state_and_the_settings_of_each_bake(use_size):
     context.scene.beamspread.resolution = 16
     bake(plane)
     panel_layout.panel()  # the state is up to date
+    context.scene.beamspread.resolution = 64
     context.scene.beamspread.use_size = use_size
     layout = Layout()
     BEAMSPREAD_PT_sidebar.draw(SimpleNamespace(layout=layout), context)
     assert "Plane: Baked" in layout.said
     assert ("resolution" in layout.properties) != use_size
+    assert ("Resize 16 x 16 to 64 x 64" in layout.buttons) != use_size
     assert {"use_live", "use_indirect"} <= set(layout.properties)
 
 

@@ -101,7 +101,7 @@ def test_a_diffuse_bake_is_named_with_a_side_that_shows_the_spread():
     (message,) = spread.messages("Wall")
     assert str(message) == (
         "The light inside 'Wall' spreads over 0.97 texels, so this is a diffuse bake. "
-        "Choose a Resolution of 4096, then Resize."
+        "Choose a Resolution of 4096, and Resize the image if there is one."
     )
     better = Spread.of(9.0, Surface(MARBLE), (spread.better_side,) * 2)
     assert better.texels >= 2

@@ -7,6 +7,7 @@ import bpy
 from ..preferences import draw_help
 from ..registration import all_or_nothing, classes
 from .bake_panel import draw_bake
+from .panels import draw_image_buttons
 
 
 class BEAMSPREAD_PT_sidebar(bpy.types.Panel):
@@ -27,6 +28,7 @@ class BEAMSPREAD_PT_sidebar(bpy.types.Panel):
         column.prop(settings, "use_indirect")
         if not settings.use_size:
             column.prop(settings, "resolution")
+        draw_image_buttons(column, context)  # beside the resolution, which existing images don't follow
 
 
 register, unregister = all_or_nothing(*classes(BEAMSPREAD_PT_sidebar))

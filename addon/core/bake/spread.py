@@ -171,7 +171,7 @@ class Spread:
     def _remedy(self) -> str:
         if self.better_side is None:
             return f"Even {MAX_OFFERED} texels along the longer side would hardly show more."
-        return f"Choose a Resolution of {self.better_side}, then Resize."
+        return f"Choose a Resolution of {self.better_side}, and Resize the image if there is one."
 
     def messages(self, name: str) -> list[Message]:
         """The note about the object `name` whose bake is a diffuse one."""
