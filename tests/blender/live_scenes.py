@@ -6,7 +6,7 @@ import bpy
 import scenes
 from beamspread.blender.live import preview, timer
 
-PATIENCE_SECONDS = 30
+PATIENCE_SECONDS = 120
 
 
 def settle(until=None):

@@ -6,7 +6,7 @@ import bpy
 import numpy as np
 import pytest
 import scenes
-from beamspread.blender.live import timer
+from beamspread.blender.live import session, timer
 from live_scenes import (
     hidden_images,
     live_lines,
@@ -47,6 +47,26 @@ def test_a_change_is_scanned_before_the_next_step(change, monkeypatch):
         scenes.node_of(material).albedo = (0.8, 0.7, 0.6)
     bpy.context.view_layer.update()
     assert len(shown) == 1
+
+
+def test_a_change_waits_for_its_picture_unless_that_was_in_vain(monkeypatch):
+    _, lamp, material = make_scene()
+    before = live_pixels(material)
+
+    def moved(x):
+        lamp.location.x = x
+        bpy.context.view_layer.update()  # no step of the timer
+        return shown_pixels(material)
+
+    monkeypatch.setattr(session, "WAIT_SECONDS", 60)
+    picture = moved(-0.4)
+    assert np.abs(picture - before).max() > 0.1 * before.max()
+    monkeypatch.setattr(session, "WAIT_SECONDS", 0)
+    monkeypatch.setattr(session, "PAUSE_SECONDS", 60)
+    with timer.live.session._thread._condition:  # nothing is finished meanwhile
+        np.testing.assert_array_equal(moved(0.4), picture)
+        monkeypatch.setattr(session, "WAIT_SECONDS", 60)
+        np.testing.assert_array_equal(moved(0.2), picture)
 
 
 def test_a_moved_lamp_reads_no_mesh(monkeypatch):

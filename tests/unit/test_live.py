@@ -103,6 +103,14 @@ def test_more_light_has_fewer_texels_and_any_light_has_some():
     assert quick_side([]) >= quick_side([LAMP]) > quick_side([AREA]) >= quick_side([AREA] * 100) == SIDES[0]
 
 
+def test_a_medium_that_has_just_changed_has_few_texels(renderer):
+    sides = []
+    for target in (live_target(LAMP), live_target(SUN), live_target(SUN, albedo=(0.9, 0.9, 0.9))):
+        sides.append(renderer.quick_side(target))
+        renderer.quick(target, 48)
+    assert sides == [128, 256, 128]
+
+
 def wait_for(condition, seconds=20):
     """Wait for it, at most as many seconds of CPU time: other processes take none of that."""
     began = time.process_time()
@@ -127,6 +135,17 @@ def test_renderings_follow_changes_and_are_exact_at_rest(thread):
     thread.show([live_target(PointLight("Lamp", 10.0, WHITE, True, (0.3, 0.0, 0.3)))])  # the same
     wait_for(lambda: not thread.is_busy())
     assert len(update()) == count
+
+
+def test_quick_renderings_can_be_awaited(thread):
+    assert thread.await_quick(0)
+    thread.show([live_target(LAMP)])
+    assert thread.await_quick(60)
+    (rendering,) = thread.take().values()
+    assert not rendering.is_exact
+    with thread._condition:  # nothing is rendered meanwhile
+        thread.show([live_target(SUN)])
+        assert not thread._condition.wait_for(lambda: thread._quickly_done == thread._generation, 0)
 
 
 def test_an_exact_rendering_stops_at_the_next_change(thread):
@@ -280,7 +299,9 @@ def test_quick_renderings_show_how_light_scatters_in_a_texture(renderer):
     """With a noise of 10 % at 48 texels: their mean is right within 2 %, and half of the convention's error is gone."""
     scattered, _, plain = checkered()
     quick, exact, other = three_renderings(renderer, scattered)
-    assert renderer.quick_side(scattered) <= 128 < renderer.quick_side(plain)  # paths take longer
+    for target in (plain, scattered):
+        renderer.quick(target, 48)
+        assert (renderer.quick_side(target) <= 128) == (target is scattered)  # paths take longer
     mean = exact.texture.mean()
     assert quick.texture.mean() == pytest.approx(mean, rel=0.02)
     assert np.abs(quick.texture - exact.texture).mean() < 0.5 * np.abs(other.texture - exact.texture).mean()

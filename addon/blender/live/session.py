@@ -28,6 +28,12 @@ END_SECONDS = 10.0
 SMALL_SCAN_SECONDS = 0.01
 """Scans shorter than this (seconds) run inside the depsgraph update; longer ones wait for the timer."""
 
+WAIT_SECONDS = 0.05
+"""Seconds for which a change waits for its picture, so that the window draws both at once; more draws less often."""
+
+PAUSE_SECONDS = 0.5
+"""Seconds without such waiting after it was in vain."""
+
 CALM_SECONDS = 0.3
 """Seconds without changes before Cycles gets a new preview, which restarts its render, or previews count as saved."""
 
@@ -62,7 +68,7 @@ class Session:
         self._targets_at_bake: list[LiveTarget] | None = None
         self._is_resting = self._was_changed = False
         self._scan_seconds = 1.0  # of the last scan of more than lamps
-        self._changed_at = self._renewed_at = time.perf_counter()
+        self._changed_at = self._renewed_at = self._waits_after = time.perf_counter()
         self._is_new_to_cycles = False
         self.seconds = 0.0
         scene_cache.log.shown_by_live = self._names_shown
@@ -78,8 +84,9 @@ class Session:
         is_small = self._scan_seconds < SMALL_SCAN_SECONDS or changes.is_lamps_alone()
         is_simple = changes.is_movement_alone() and all(map(shows_medium_alone, changes.materials))
         if (changes or changes.nodes) and is_simple and is_small and not self._is_resting and not is_occupied():
-            # Now, so that it is rendered while the window is drawn.
+            # Now, so that it is rendered before the window is drawn, or meanwhile.
             self._scan(depsgraph)
+            self._show_at_once(bpy.context)
 
     def recover(self) -> None:
         """Read everything again and make previews anew after undo, which replaces any data."""
@@ -269,6 +276,18 @@ class Session:
             restart_views(context)
             redraw(context, "VIEW_3D")
         return shown
+
+    def _show_at_once(self, context) -> None:
+        """Show quick renderings before the window is drawn if they are there soon, in previews that are there."""
+        previews = [self._previews.get(target.target.image_key) for target in self._targets]
+        if None in previews or not all(preview.is_shown() for preview in previews) or is_seen_by_cycles(context):
+            return
+        if time.perf_counter() < self._waits_after:
+            return
+        if not self._thread.await_quick(WAIT_SECONDS):
+            self._waits_after = time.perf_counter() + PAUSE_SECONDS
+        elif self._show_renderings(context):
+            self.seconds = time.perf_counter() - self._changed_at
 
     def _show(self, rendering: Rendering) -> bool:
         """Show one rendering; False if its node has changed meanwhile, or another object is in its place."""

@@ -56,7 +56,7 @@ class RenderThread:
         self._rest_seconds = rest_seconds
         self._condition = threading.Condition()
         self._targets: tuple[LiveTarget, ...] = ()
-        self._generation, self._done = 0, 0
+        self._generation, self._done, self._quickly_done = 0, 0, 0
         self._is_ending = False
         self._work: dict[Target, Work] = {}
         self._thread = threading.Thread(target=self._run, daemon=True, name="Beamspread renderer")
@@ -87,6 +87,11 @@ class RenderThread:
             if self._work.get(rendering.target) is work:
                 latest[rendering.target] = rendering
         return latest
+
+    def await_quick(self, seconds: float) -> bool:
+        """Wait for the quick renderings of the targets to show; True if they were finished within this time."""
+        with self._condition:
+            return self._condition.wait_for(lambda: self._quickly_done == self._generation, seconds)
 
     def is_busy(self) -> bool:
         """True while renderings are still to come."""
@@ -129,6 +134,9 @@ class RenderThread:
             if self._is_outdated(generation):
                 return False
             missing.update(dict.fromkeys(self._render_quickly(target)))
+        with self._condition:
+            self._quickly_done = generation
+            self._condition.notify_all()
         for target in targets:
             self._add_bounced(target, generation)
         planes, curves = ([medium for medium, curved in missing if curved == wanted] for wanted in (False, True))

@@ -49,6 +49,9 @@ MAX_QUICK_COST = 24 * 256**2
 SCATTERED_SIDE = 128
 """Most texels along the longer side of a quick rendering in whose texture light scatters; more is finer and slower."""
 
+NEW_MEDIUM_SIDE = 128
+"""The same for a medium that has just changed, so that its kernels are new; more is finer and slower."""
+
 QUICK_RAYS = 4
 """Rays from each texel of a quick rendering to a light with a size; more has less noise and is slower."""
 
@@ -107,6 +110,7 @@ class LiveRenderer:
         self._receivers: dict = {}
         self._meshes: dict = {}
         self._direct: dict[Target, np.ndarray] = {}  # last quick luminance, at its few texels
+        self._media: dict[Target, tuple] = {}  # of the last quick rendering
         self._bounced = BouncedLayers()
 
     def size_of(self, target: LiveTarget) -> tuple[int, int]:
@@ -117,6 +121,8 @@ class LiveRenderer:
         """Texels along the longer side of a quick rendering of the target; few where that takes longer."""
         is_slow = self._mesh(target).is_bent or has_back(target.surface.thickness, target.settings)
         side = SIDES[0] if is_slow else quick_side(target.illumination.lights)
+        if self._media.get(target.target) != self._medium(target):
+            side = min(side, NEW_MEDIUM_SIDE)
         return min(side, SCATTERED_SIDE) if is_scattered(target) else side
 
     def quick(self, target: LiveTarget, side: int, progress: Progress | None = None) -> Rendering:
@@ -128,6 +134,7 @@ class LiveRenderer:
         settings = replace(target.settings, samples=min(QUICK_SAMPLES, target.settings.samples))
         direct = self._quick_texture(target, _coarse(target.illumination), framed, settings, progress)
         keep_recent(self._direct, target.target, direct, MAX_RECEIVERS)
+        keep_recent(self._media, target.target, self._medium(target), MAX_RECEIVERS)
         return self._together(target)
 
     def quick_bounced(self, target: LiveTarget, progress: Progress | None = None) -> Rendering:
@@ -206,6 +213,11 @@ class LiveRenderer:
         if settings.distributions != "library":
             sources = [load_source(settings.sample_folder, settings.distributions)] * 3
         return material, sources
+
+    def _medium(self, target: LiveTarget) -> tuple:
+        """What the target's kernels depend on."""
+        material, sources = self._material(target)
+        return material, *sources
 
     def _coarse_receiver(self, target: LiveTarget, side: int) -> FramedReceiver:
         """The receiver with at most `side` texels along the longer side."""
