@@ -23,9 +23,10 @@ OPEN_PATH, ROOM_PATH = 1.0, 1.7
 
 # Paths of each part of the hemisphere at a node that bring the noise of light that is all bounced to one percent, on
 # planes and on surfaces that bend; and the fewest that are traced.
-PATHS, BENT_PATHS, MIN_PATHS = 130.0, 100.0, 1.0
-# Part of even light's square that counts as noise, beside the squares of the differences between directions.
-EVEN_NOISE = 0.2
+PATHS, BENT_PATHS, MIN_PATHS = 16.0, 8.0, 2.0
+# Part of even light's square that counts as noise, beside the squares of the differences between directions; and the
+# largest noise: paths are guided to spots that are brighter.
+EVEN_NOISE, MOST_NOISE = 0.2, 1.4
 
 # The same of paths by Cycles, which nothing guides: on planes, where a filter helps, and on bent surfaces; the fewest
 # and the most; and seconds of one thread for each.
@@ -66,17 +67,21 @@ class Surroundings:
 
     @property
     def bounced(self) -> float:
-        """Part of all light that is bounced, about; more where few directions bring it, whose noise is larger."""
-        if self.returned is not None:
-            mean, square = self.returned[0] ** 2, self.returned[1] ** 2
-            return math.sqrt(max(square - mean, 0.0) + EVEN_NOISE * mean)
-        bounced = BOUNCED_PART * self.enclosed
-        return bounced / max(self.lit + bounced, 1e-9)
+        """Noise of bounced light relative to all light, up to a factor: more where few directions bring it."""
+        if self.returned is None:
+            return MOST_NOISE * self._bounced_part()
+        mean, square = self.returned[0] ** 2, self.returned[1] ** 2
+        return min(math.sqrt(max(square - mean, 0.0) + EVEN_NOISE * mean), MOST_NOISE)
 
     @property
     def bounced_in_cycles(self) -> float:
         """The same for light by Cycles, whose filter removes part of the noise of bright directions."""
-        return self.bounced if self.returned is None else math.sqrt(math.prod(self.returned))
+        return self._bounced_part() if self.returned is None else math.sqrt(math.prod(self.returned))
+
+    def _bounced_part(self) -> float:
+        """Part of all light that is bounced, about, in a room of usual colors."""
+        bounced = BOUNCED_PART * self.enclosed
+        return bounced / max(self.lit + bounced, 1e-9)
 
     def shares_on(self, side: int) -> Shares | None:
         """`Shares` of the receiver (0) or of its other face (1); None if they are not known."""
