@@ -17,8 +17,8 @@ SHADER_MENUS = ("NODE_MT_category_shader_shader", "NODE_MT_category_SH_NEW_SHADE
 """Names of the menu Add > Shader: of the Shader Editor in newer versions, and in Blender 3.4."""
 
 
-BAR_LETTERS = 20
-"""Letters of a progress bar, which fit the panels of a new window."""
+BAR_LETTERS = 18
+"""Letters of a progress bar, which fit the side bar of a new window."""
 
 
 def session_id(block) -> int:

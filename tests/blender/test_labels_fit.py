@@ -5,6 +5,7 @@ from types import SimpleNamespace
 import blf
 import bpy
 import pytest
+from beamspread.blender import compat
 from beamspread.blender.node.draw import draw_properties
 from beamspread.blender.node.node import BeamspreadNode
 
@@ -111,3 +112,14 @@ def test_widths_are_those_of_the_window():
     """Texts that Blender 3.4 was seen to cut, and to show."""
     assert width_of("Scattering Albedo") > FIELD_PIXELS > width_of("Base Color") > 40
     assert width_of("Mean free path: 0.456, 0.381, 0.333 mm") > PIXELS
+
+
+@pytest.mark.parametrize("fraction", [0.0, 0.5, 1.0])
+def test_a_bar_fits(fraction):
+    """Blender 3.4, which draws it by letters, was seen to cut a bar of `PIXELS`."""
+    layout = Recorder(is_split=False)
+    if hasattr(bpy.types.UILayout, "progress"):
+        layout.progress = lambda factor, text: layout.label(text)
+    compat.draw_progress_bar(layout, fraction, "49%, about 9 s left")
+    assert layout.labels
+    assert max(map(width_of, layout.labels)) < 0.95 * PIXELS
