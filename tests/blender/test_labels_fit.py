@@ -118,7 +118,7 @@ def test_widths_are_those_of_the_window():
 def test_a_bar_fits(fraction):
     """Blender 3.4, which draws it by letters, was seen to cut a bar of `PIXELS`."""
     layout = Recorder(is_split=False)
-    if hasattr(bpy.types.UILayout, "progress"):
+    if "progress" in bpy.types.UILayout.bl_rna.functions:
         layout.progress = lambda factor, text: layout.label(text)
     compat.draw_progress_bar(layout, fraction, "49%, about 9 s left")
     assert layout.labels
