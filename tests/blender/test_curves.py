@@ -11,6 +11,7 @@ from beamspread.blender.jobs.state import state
 from beamspread.blender.node.uv_maps import objects_with_maps
 from beamspread.blender.read.geometry import OWN_MAP, read_polygons
 from beamspread.blender.read.visibility import as_rendered
+from beamspread.core.scene.flat_mesh import flatten
 from beamspread.core.scene.islands import check_map
 from live_scenes import live_lines, live_pixels, settle, switch_off
 from nodes import Nodes
@@ -52,6 +53,16 @@ def with_material(obj):
         bpy.context.collection.objects.link(obj)
     bpy.context.view_layer.update()
     return obj
+
+
+def test_slivers_of_a_text_are_not_said_to_look_to_opposite_sides():
+    """Blender fills letters with triangles some of which have no area."""
+    text = add_text("Text", extrude=0.05)
+    polygons = read_polygons(evaluated(text), "Medium")
+    assert (polygons.areas == 0).sum() > 4
+    mesh = flatten(polygons, 0.02, "Text", spread=1.0)
+    assert mesh.is_bent
+    assert not any("opposite sides" in message.text for message in mesh.messages)
 
 
 def evaluated(obj):

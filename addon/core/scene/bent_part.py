@@ -152,7 +152,8 @@ def _faults(polygons: Polygons, name: str) -> list[Message]:
     is_same_way = polygons.points[first] == polygons.points[second]
     # Where more than two faces meet, as where bodies touch or lie on each other, some of them look to other sides.
     meetings = np.bincount(np.concatenate([first, second]), minlength=len(looks))
-    is_wrong = (is_same_way == (looks[first] == looks[second])) & (meetings[first] == 1) & (meetings[second] == 1)
+    is_told = (meetings[first] == 1) & (meetings[second] == 1) & (looks[first] * looks[second] != 0)  # by an area
+    is_wrong = (is_same_way == (looks[first] == looks[second])) & is_told
     if is_wrong.sum() > MIN_FAULT * len(first):
         text = f"Faces of '{name}' that touch look to opposite sides, at {is_wrong.sum()} of {len(first)} edges."
         remedy = "Light can't be right there. Recalculate the normals (Edit Mode: Shift N), or check modifiers."
