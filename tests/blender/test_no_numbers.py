@@ -2,6 +2,7 @@
 
 import bpy
 import numpy as np
+import panel_layout
 import pytest
 import scenes
 from beamspread.blender.jobs.state import state
@@ -137,3 +138,17 @@ def test_a_scale_of_zero_along_two_axes_is_named():
     scenes.select(box)
     with pytest.raises(RuntimeError, match="zero along more than one axis"):
         bpy.ops.beamspread.bake()
+
+
+@pytest.mark.parametrize("value", VALUES.values(), ids=VALUES)
+def test_the_panel_names_faces_at_no_position_before_the_bake(value):
+    wall = add_wall(scenes.add_material())
+    wall.data.vertices[4].co.z = value
+    wall.data.update()
+    said = panel_layout.panel()
+    assert "The positions of face 1 are infinite or not numbers." in said
+    scenes.select(wall)
+    assert "The positions of face 1 are" in scenes.messages_of(bpy.ops.beamspread.bake)
+    wall.data.vertices[4].co.z = 0.0  # moved, as the sentence says
+    wall.data.update()
+    assert baked(wall)[0].any()

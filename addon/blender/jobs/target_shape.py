@@ -9,9 +9,9 @@ import numpy as np
 from mathutils import Vector
 
 from ...core.bake.spread import image_length, spread_over_edges
-from ...core.errors import BakeError, ReceiverError
+from ...core.errors import BakeError
 from ...core.scene.bent_grid import HOLLOW_SIDE, see_each_other
-from ...core.scene.flat_mesh import NO_FACES, bends
+from ...core.scene.flat_mesh import bends, check_faces
 from ...core.scene.polygons import Polygons
 from ...core.scene.receiver import Grid
 from ...core.scene.stretch import lengths_of_faces, pieces_of_faces
@@ -71,8 +71,7 @@ def shape_of(target: BakeTarget, depsgraph) -> Shape:
     def read() -> Shape:
         try:
             polygons = read_polygons(evaluated, target.material.name, None, node.uv_map, is_tiled)
-            if not polygons.count:
-                raise ReceiverError(*NO_FACES)
+            check_faces(polygons, obj.name)
             length = image_length([polygons])
             if not 0 < length < math.inf:
                 return Shape()

@@ -72,7 +72,10 @@ NO_FACES = "No face uses this material.", "Assign it to the faces that should be
 
 def finite_remedy(name: str) -> str:
     """Advice about an object with vertices at no finite position."""
-    return f"Check its scale and modifiers, or run bpy.data.objects['{name}'].data.validate() in the Python Console."
+    return (
+        "Check its scale and modifiers, or move the vertices (Edit Mode). "
+        f"bpy.data.objects['{name}'].data.validate() in the Python Console moves those that are no numbers."
+    )
 
 
 def flatten(
@@ -91,11 +94,7 @@ def flatten(
         The mesh has no faces, no area or vertices at no finite position; or UVs that are missing, outside 0..1 or all
         without area.
     """
-    if not polygons.count:
-        raise ReceiverError(*NO_FACES)
-    if not polygons.is_finite.all():
-        text = f"The positions of {polygons.listed(~polygons.is_finite)} are infinite or not numbers."
-        raise ReceiverError(text, finite_remedy(name))
+    check_faces(polygons, name)
     tolerance = _tolerance(polygons, mean_free_path)
     polygons, planes, bent = _planes_of(polygons, tolerance)
     check_uvs(polygons.uvs)
@@ -135,6 +134,15 @@ def flatten(
         paths = f", {deviation / mean_free_path:.2g} mean free paths" if mean_free_path > 0 else ""
         messages.append(note(name, f"{text}{paths}."))
     return FlatMesh(tuple(parts), tuple(messages), polygons.uv_map)
+
+
+def check_faces(polygons: Polygons, name: str) -> None:
+    """Raise ReceiverError if the object `name` has no faces, or vertices at no finite position."""
+    if not polygons.count:
+        raise ReceiverError(*NO_FACES)
+    if not polygons.is_finite.all():
+        text = f"The positions of {polygons.listed(~polygons.is_finite)} are infinite or not numbers."
+        raise ReceiverError(text, finite_remedy(name))
 
 
 def bends(polygons: Polygons, mean_free_path: float = 0.0, spread: float = 0.0) -> bool:
