@@ -9,6 +9,7 @@
 #include "bake/canvas_light.h"
 #include "bake/field_bake.h"
 #include "bake/stored_light.h"
+#include "base/threads.h"
 #include "simd/loops.h"
 #include "solve/solve.h"
 
@@ -127,9 +128,11 @@ RaySettings BakeOptions::ray_settings(int ray_count) const
             .noise = noise};
 }
 
-void bake_luminance(const std::vector<Surface>& surfaces, const std::vector<ArrivingLights>& lights,
-                    const std::vector<ChannelMedium>& channels, const BakeOptions& options, Progress& progress,
-                    const std::vector<float*>& luminance)
+namespace {
+
+void bake_surfaces(const std::vector<Surface>& surfaces, const std::vector<ArrivingLights>& lights,
+                   const std::vector<ChannelMedium>& channels, const BakeOptions& options, Progress& progress,
+                   const std::vector<float*>& luminance)
 {
     const std::vector<Canvas> all = canvases_of(surfaces, channels, options);
     double texels = 0.0;
@@ -193,6 +196,16 @@ void bake_luminance(const std::vector<Surface>& surfaces, const std::vector<Arri
             add_part(noise, surface.grid.shape->area / area, *options.noise);
     }
     progress.finish();
+}
+
+}  // namespace
+
+void bake_luminance(const std::vector<Surface>& surfaces, const std::vector<ArrivingLights>& lights,
+                    const std::vector<ChannelMedium>& channels, const BakeOptions& options, Progress& progress,
+                    const std::vector<float*>& luminance)
+{
+    with_threads(options.threads,
+                 [&] { bake_surfaces(surfaces, lights, channels, options, progress, luminance); });
 }
 
 void bake_arrival(const Surface& surface, const std::vector<SurfaceLight>& lights, const BakeOptions& options,

@@ -17,7 +17,13 @@ void with_threads(int threads, const std::function<void()>& body)
         reject("threads", threads, "0 (all) or more");
     // More threads than cores gain nothing and make TBB write a warning to the host's stderr.
     const int cores = tbb::info::default_concurrency();
-    tbb::task_arena arena(threads == 0 ? cores : std::min(threads, cores));
+    const int wanted = threads == 0 ? cores : std::min(threads, cores);
+    const bool are_set_up = tbb::this_task_arena::current_thread_index() != tbb::task_arena::not_initialized;
+    if (are_set_up && tbb::this_task_arena::max_concurrency() == wanted) {
+        tbb::this_task_arena::isolate(body);  // this thread helps no loops around it, which use the same objects
+        return;
+    }
+    tbb::task_arena arena(wanted);
     arena.execute(body);
 }
 

@@ -11,7 +11,8 @@
 namespace beamspread {
 
 // Calls body() on this thread. Parallel loops inside it use up to `threads` threads (0: all), this one included. Use it
-// once around a whole job: setting up the threads costs more than a short loop.
+// once around a whole job: setting up the threads costs more than a short loop. Inside a call for as many threads it
+// costs next to nothing.
 void with_threads(int threads, const std::function<void()>& body);
 
 // Number of threads that a parallel loop started here may use.
