@@ -204,8 +204,7 @@ void bake_luminance(const std::vector<Surface>& surfaces, const std::vector<Arri
                     const std::vector<ChannelMedium>& channels, const BakeOptions& options, Progress& progress,
                     const std::vector<float*>& luminance)
 {
-    with_threads(options.threads,
-                 [&] { bake_surfaces(surfaces, lights, channels, options, progress, luminance); });
+    with_threads(options.threads, [&] { bake_surfaces(surfaces, lights, channels, options, progress, luminance); });
 }
 
 void bake_arrival(const Surface& surface, const std::vector<SurfaceLight>& lights, const BakeOptions& options,

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import NoReturn
 
 import numpy as np
 
@@ -28,6 +29,10 @@ MAX_LOST = 0.01
 # Texels along the side of an image in which overlaps are looked for, and part of the map that may overlap: rounding,
 # and faces that share a border.
 PROBE_SIDE, MAX_OVERLAP = 2048, 0.01
+
+# Part of the map that must overlap, by the areas of its faces, from which on no texels are filled: this takes as many
+# times as long as faces lie on each other.
+CLEAR_OVERLAP = 0.9
 
 # Largest number of islands of a mesh; more take much time and memory.
 MAX_ISLANDS = 100_000
@@ -87,12 +92,19 @@ def check_map(polygons: Polygons) -> None:
         listed = "" if is_lost.all() else f": {polygons.listed(is_lost)}"
         text = f"The UV map has no area in {is_lost.sum()} of {polygons.count} faces{listed}."
         raise ReceiverError(text, UNWRAP)
+    total, in_tiles = max(float(sizes.sum()), 1e-30), polygons.by_tile()
+    least = 1 - len(in_tiles) / total  # images show no more
+    if least > CLEAR_OVERLAP:
+        _refuse_overlap(f"over {min(int(100 * least), 99)}%")
     # A small map fills few texels of the probe.
-    shown = sum(map(_shown, polygons.by_tile().values()))
-    overlap = 1 - shown / max(float(sizes.sum()) * PROBE_SIDE**2, 1e-30)
+    overlap = 1 - sum(map(_shown, in_tiles.values())) / (total * PROBE_SIDE**2)
     if overlap > MAX_OVERLAP:
-        text = f"The UV map overlaps: {overlap:.0%} of it show several faces."
-        raise ReceiverError(text, UNWRAP_APART)
+        _refuse_overlap(f"{overlap:.0%}")
+
+
+def _refuse_overlap(part: str) -> NoReturn:
+    text = f"The UV map overlaps: {part} of it show several faces."
+    raise ReceiverError(text, UNWRAP_APART)
 
 
 def _shown(polygons: Polygons) -> float:
