@@ -364,10 +364,15 @@ def read_pass(render_pass, width: int, height: int) -> np.ndarray:
 
 def baked_triangles(passes, width: int, height: int) -> np.ndarray:
     """Int32 (height, width): triangle of each texel, negative without one or if it belongs to another image."""
+    return baked_points(passes, width, height)[0]
+
+
+def baked_points(passes, width: int, height: int) -> tuple[np.ndarray, np.ndarray]:
+    """Triangle of each texel as by `baked_triangles`, and the weights of its first two corners, (height, width, 2)."""
     primitives = read_pass(passes["BakePrimitive"], width, height)
     # The number is stored as the bits of a float: 3.4 gives seed, triangle, u, v, later versions u, v, triangle.
-    channel = 1 if primitives.shape[2] == 4 else 2
-    return np.ascontiguousarray(primitives[..., channel]).view(np.int32)
+    channel, weights = (1, slice(2, 4)) if primitives.shape[2] == 4 else (2, slice(0, 2))
+    return np.ascontiguousarray(primitives[..., channel]).view(np.int32), primitives[..., weights]
 
 
 def write_pass(render_pass, values: np.ndarray) -> None:

@@ -54,6 +54,46 @@ def test_same_as_the_operator():
     assert filled == pytest.approx(scenes.bake(plane)[0], abs=1e-6)
 
 
+def with_second_map(plane):
+    """The node shows its image by a map that fills the left half of it; the artist's map fills all."""
+    layer = plane.data.uv_layers.new(name="Second", do_init=False)
+    layer.data.foreach_set("uv", np.float32(np.multiply(scenes.SQUARE_UVS, (0.5, 1))).ravel())
+    node = scenes.node_of(plane.data.materials[0])
+    node.uv_map = "Second"
+    return node
+
+
+@pytest.mark.parametrize("uv_map", ["", "UVMap", "Second"])
+def test_an_image_of_ones_own_is_filled_by_the_map_of_blenders_bake(uv_map):
+    plane = scenes.add_plane(material=scenes.add_material())
+    scenes.add_sun(40, 30)
+    node = with_second_map(plane)
+    image = add_active_image(plane.data.materials[0])
+    scenes.select(plane)
+    options = {"uv_layer": uv_map} if uv_map else {}
+    assert bpy.ops.object.bake(type="COMBINED", **options) == {"FINISHED"}
+    assert state.lines() == []
+    filled = scenes.pixels(image)
+    node.uv_map, node.image = uv_map or "UVMap", bpy.data.images.new("Shown", 32, 32, float_buffer=True)
+    expected = scenes.bake(plane)[0]
+    inside = filled.any(axis=-1)
+    assert inside.mean() == (0.5 if uv_map == "Second" else 1)
+    assert filled[inside] == pytest.approx(expected[inside], abs=1e-6)
+
+
+def test_a_nodes_image_is_refused_by_another_map_than_it_is_shown_by():
+    plane = scenes.add_plane(material=scenes.add_material())
+    scenes.add_sun(40, 30)
+    node = with_second_map(plane)
+    image = node.image = add_active_image(plane.data.materials[0])
+    scenes.select(plane)
+    message = scenes.messages_of(lambda: bpy.ops.object.bake(type="COMBINED"))
+    assert "Blender's Bake fills the UV map 'UVMap', and the node shows its image by 'Second'." in message
+    plane.data.uv_layers.active = plane.data.uv_layers["Second"]
+    assert bpy.ops.object.bake(type="COMBINED") == {"FINISHED"}
+    assert scenes.pixels(image)[:, :16].all()
+
+
 class Stopping:
     """An engine whose user presses Esc."""
 

@@ -267,6 +267,7 @@ def read_plans(
     indirect: bool | None = None,
     maps: Mapping[str, Outcome] | None = None,
     fills_nodes: bool = False,
+    uv_map: str = "",
 ) -> list[Plan]:
     """Read the targets and the light of a depsgraph, which is not needed afterwards.
 
@@ -275,6 +276,7 @@ def read_plans(
     visible : names of the objects that render; None: all.
     resolution, indirect, fills_nodes : as for `read_scene`.
     size : width and height of the texture, overrides all other sizes.
+    uv_map : name of the UV map of that texture; "": each node's choice.
     copy : copy of the scene for Cycles, if there is one already. Else the first job that needs one makes it.
     cache : results of earlier reads, for a depsgraph of the viewport; None: everything is read.
     maps : outcomes of `make_maps`.
@@ -302,7 +304,7 @@ def read_plans(
         check_instance(target.object_name, instance, depsgraph.view_layer)
         if isinstance(outcome, BakeError):
             raise outcome
-        receivers[target] = read_receiver(target, instance, size is None, outcome)
+        receivers[target] = read_receiver(target, instance, size is None, outcome, uv_map)
 
     def read_plan(target: Target) -> None:
         if target in receivers:

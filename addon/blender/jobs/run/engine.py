@@ -13,7 +13,7 @@ from bpy.app.handlers import persistent
 
 from ....core.bake.bake_settings import COMBINED
 from ....core.bake.runner import WRITTEN, Bake, Sink, run_bakes
-from ....core.errors import text_of
+from ....core.errors import BakeError, text_of
 from ....core.progress import Progress
 from ....core.target import BACK, Target
 from ... import compat
@@ -25,8 +25,11 @@ from ..out_of_date import stale
 from ..out_of_date.fingerprint import Parts
 from ..state import state
 from .active_image import ENGINE, active_image, check_active_image
-from .bake_plan import read_plans
+from .bake_plan import BakePlan, FailedPlan, Plan, read_plans
 from .render_copy import render_picture, show_by_eevee
+
+MAX_PROBED = 1000
+"""Number of texels that tell which UV map Blender bakes to, about."""
 
 
 class BeamspreadEngine(bpy.types.RenderEngine):
@@ -101,11 +104,61 @@ def _prepare(engine, depsgraph, obj, passes, size: tuple[int, int]) -> list[Bake
         for target in targets:
             check_active_image(target, settings, is_running=True)
         check = partial(Progress(lambda _: not engine.test_break()).check, 0.0)
-        plans = read_plans(depsgraph, [target.name for target in targets], None, None, size, fillings.copy, None, check)
+        arguments = None, None, size, fillings.copy, None, check
+        plans = read_plans(depsgraph, [target.name for target in targets], *arguments)
+        plans = _in_map_of_blender(plans, depsgraph, obj, _baked_map(obj, passes, *size), arguments)
         bakes = [plan.bake(settings) for plan in plans] or find_misplaced([obj])
     except Exception as error:  # noqa: BLE001 - Blender would swallow it
         return [Bake(Target(obj.name), error=error)]
     return bakes or [Bake(Target(obj.name), error=NOTHING_FOUND)]
+
+
+def _in_map_of_blender(plans: list[Plan], depsgraph, obj, uv_map: str, arguments: tuple) -> list[Plan]:
+    """Plans of bakes in the UV map that Blender's Bake fills; of failures where the node shows its image by another."""
+    result = []
+    for plan in plans:
+        if not isinstance(plan, BakePlan) or uv_map in ("", own := plan.mesh.uv_map or _rendered_map(obj)):
+            result.append(plan)
+        elif image_of(plan.target) == active_image(bpy.data.materials[plan.target.material_name]):
+            text = f"Blender's Bake fills the UV map '{uv_map}', and the node shows its image by '{own}'."
+            remedy = "Use Beamspread's own Bake, or make that map active (Object Data Properties > UV Maps)."
+            result.append(FailedPlan(plan.target, BakeError(text, remedy)))
+        else:
+            result += read_plans(depsgraph, [plan.target], *arguments, uv_map=uv_map)
+    return result
+
+
+def _rendered_map(obj) -> str:
+    """Name of the UV map of an evaluated object that renders."""
+    return next((layer.name for layer in getattr(obj.data, "uv_layers", ()) if layer.active_render), "")
+
+
+def _baked_map(obj, passes, width: int, height: int) -> str:
+    """Name of the UV map that Blender's Bake fills, as its texels tell: the active one or an argument's; or ""."""
+    triangles, weights = compat.baked_points(passes, width, height)
+    rows, columns = np.nonzero(triangles >= 0)
+    step = max(len(rows) // MAX_PROBED, 1)
+    rows, columns = rows[::step], columns[::step]
+    mesh = obj.to_mesh()
+    try:
+        mesh.calc_loop_triangles()
+        loops = np.empty(3 * len(mesh.loop_triangles), np.int32)
+        mesh.loop_triangles.foreach_get("loops", loops)
+        chosen = triangles[rows, columns]
+        if not len(chosen) or chosen.max() >= len(mesh.loop_triangles):
+            return ""
+        corners, (u, v) = loops.reshape(-1, 3)[chosen], weights[rows, columns].T
+        at = np.column_stack([(columns + 0.5) / width, (rows + 0.5) / height])
+        distances = {}
+        for layer in sorted(mesh.uv_layers, key=lambda layer: not layer.active_render):
+            uvs = np.empty((len(mesh.loops), 2), np.float32)
+            layer.data.foreach_get("uv", uvs.ravel())
+            shown = np.einsum("nc,nck->nk", np.column_stack([u, v, 1 - u - v]), uvs[corners])
+            distances[layer.name] = float(np.median(np.abs((shown - at + 0.5) % 1 - 0.5)))
+    finally:
+        obj.to_mesh_clear()
+    nearest = min(distances, key=distances.get, default="")
+    return nearest if nearest and distances[nearest] < 1 / min(width, height) else ""
 
 
 def _fills_own_image(bake: Bake) -> bool:

@@ -33,15 +33,22 @@ class Receiving:
     is_tiled: bool
 
 
-def read_receiver(target: Target, instance: ObjectInstance, fills_image: bool, outcome: Message | None) -> Receiving:
-    """Read a target; `fills_image` is False if its result goes to another image than the node's."""
+def read_receiver(
+    target: Target, instance: ObjectInstance, fills_image: bool, outcome: Message | None, uv_map: str = ""
+) -> Receiving:
+    """Read a target; `fills_image` is False if its result goes to another image than the node's.
+
+    `uv_map` names the map of that image; "": the node's choice.
+    """
     evaluated: BakeTarget = next(evaluated for evaluated in targets_of(instance.obj) if evaluated.name == target)
     surface, image = evaluated.node.surface(), evaluated.image
     surface.check()
     if fills_image and image is not None and not is_sequence(image):  # a batch fills a sequence's files
         check_image(image)
     is_tiled = fills_image and uses_tiles(evaluated.node, target.side)
-    polygons = read_polygons(instance.obj, target.material_name, instance.matrix, evaluated.node.uv_map, is_tiled)
+    polygons = read_polygons(
+        instance.obj, target.material_name, instance.matrix, uv_map or evaluated.node.uv_map, is_tiled
+    )
     path = min(surface.material.mean_free_path)
     mesh = flatten(polygons, path, target.object_name, spread_over_edges(surface), surface.thickness > 0)
     if outcome is not None:
