@@ -65,6 +65,18 @@ def test_slivers_of_a_text_are_not_said_to_look_to_opposite_sides():
     assert not any("opposite sides" in message.text for message in mesh.messages)
 
 
+def test_remedies_in_edit_mode_ask_for_a_mesh_first():
+    text = add_text("Hey", extrude=0.05)
+    scenes.bake(text)
+    (line,) = [line for line in state.lines() if "loose parts" in line]
+    assert line.split(". ", 1)[0].endswith("as if they touched")
+    assert "Convert it to a mesh first (Object > Convert > Mesh). Separate them (Edit Mode: P, By Loose Parts)" in line
+    bpy.ops.object.convert(target="MESH")
+    scenes.bake(bpy.context.object)
+    (line,) = [line for line in state.lines() if "loose parts" in line]
+    assert "Convert" not in line
+
+
 def evaluated(obj):
     return obj.evaluated_get(bpy.context.evaluated_depsgraph_get())
 

@@ -51,9 +51,18 @@ def read_receiver(
     )
     path = min(surface.material.mean_free_path)
     mesh = flatten(polygons, path, target.object_name, spread_over_edges(surface), surface.thickness > 0)
+    if instance.obj.type != "MESH":
+        mesh = replace(mesh, messages=tuple(map(_for_curves, mesh.messages)))
     if outcome is not None:
         mesh = replace(mesh, messages=(outcome, *mesh.messages))
     return Receiving(evaluated, instance, surface, mesh, is_tiled)
+
+
+def _for_curves(message: Message) -> Message:
+    """The message about a text or a curve, whose Edit Mode is not that of a mesh."""
+    if "Edit Mode" not in message.remedy:
+        return message
+    return replace(message, remedy=f"Convert it to a mesh first (Object > Convert > Mesh). {message.remedy}")
 
 
 def sized(
