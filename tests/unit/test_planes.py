@@ -344,3 +344,12 @@ def test_planes_that_exchange_light_over_edges_are_one_part():
     assert flatten(cube, spread=0.02).is_bent
     floor = mesh_of([box()[0]], [SQUARE])
     assert not flatten(floor, spread=10.0).is_bent  # no plane meets another
+
+
+def test_chosen_faces_have_the_areas_of_a_mesh_of_their_own():
+    faces = [face * (1, 2, 3) for face in box()]
+    mesh, chosen = mesh_of(faces, atlas(6)), [4, 1]
+    expected = mesh.of_faces(np.array(chosen)).areas
+    assert mesh.areas.max() == 6  # computed before faces are chosen
+    np.testing.assert_array_equal(mesh.of_faces(np.array(chosen)).areas, expected)
+    np.testing.assert_array_equal(mesh.of_faces(np.array(chosen)).area_vectors, mesh.area_vectors[chosen])

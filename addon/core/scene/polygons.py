@@ -141,7 +141,11 @@ class Polygons:
         numbers = np.arange(self.count)[faces] if self.numbers is None else self.numbers[faces]
         tiles = None if self.tiles is None else self.tiles[faces]
         shading = None if self.corner_normals is None else self.corner_normals[corners]
-        return Polygons(self.corners[corners], uvs, starts, self.normals[faces], self.uv_map, numbers, tiles, shading)
+        part = Polygons(self.corners[corners], uvs, starts, self.normals[faces], self.uv_map, numbers, tiles, shading)
+        for name in ("area_vectors", "areas"):
+            if name in self.__dict__:  # known already
+                part.__dict__[name] = self.__dict__[name][faces]
+        return part
 
     def by_tile(self) -> dict[int, Polygons]:
         """Faces of each UDIM tile, by its number; all by 0 without tiles."""
