@@ -123,6 +123,7 @@ RaySettings BakeOptions::ray_settings(int ray_count) const
             .rays = ray_count,
             .even_rays =
                 std::clamp(ray_count / rays_per_even_ray, min_even_rays, std::max(max_even_rays, samples * samples)),
+            .at_centers = at_centers,
             .seed = seed,
             .threads = threads,
             .noise = noise};

@@ -29,6 +29,7 @@ struct BakeOptions {
     RayNoise* noise = nullptr;  // takes the noise of all lights by rays; may be null
     // Takes the share of each surface's area that bends more than the LDFs of the media cover; may be null.
     std::vector<double>* beyond_shares = nullptr;
+    bool at_centers = false;  // see RaySettings
 
     // Settings for a light of so many rays from each texel.
     RaySettings ray_settings(int ray_count) const;

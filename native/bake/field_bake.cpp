@@ -217,6 +217,7 @@ private:
             static_cast<double>(patch.surface->samples()) / static_cast<double>(coarse.samples());
         BakeOptions options = m_options;
         options.samples = 1;
+        options.at_centers = true;
         options.noise = nullptr;
         RaySettings settings = options.ray_settings(survey_rays);
         settings.even_rays = 0;

@@ -220,11 +220,12 @@ Array<float> field_luminance(HeldField& held, const HeldSurface& surface, const 
 }
 
 py::tuple arrival(const HeldSurface& held, const LightTuples& light_tuples, int samples, int rays, std::uint32_t seed,
-                  int threads, const py::object& progress, const py::object& report_noise)
+                  int threads, const py::object& progress, const py::object& report_noise, bool at_centers)
 {
     const std::vector<SurfaceLight> lights = lights_of(light_tuples);
     RayNoise noise;
     BakeOptions options = options_of(samples, rays, seed, threads);
+    options.at_centers = at_centers;
     options.noise = &noise;
     Progress report(progress_callback(progress));
     Array<float> irradiance = new_vectors(held.surface.grid);
@@ -397,10 +398,11 @@ side : {"reflected", "transmitted"}
 
     m.def("bake_arrival", &arrival, py::arg("surface"), py::arg("lights"), py::arg("samples") = 4,
           py::arg("rays") = 256, py::arg("seed") = 0, py::arg("threads") = 0, py::arg("progress") = py::none(),
-          py::arg("report_noise") = py::none(),
+          py::arg("report_noise") = py::none(), py::arg("at_centers") = false,
           R"(Light on the whole of each texel, without a medium; arguments as for `bake_luminance`.
 
-`rays` are those to each light of a size.
+`rays` are those to each light of a size. With `at_centers` its falloff is that at the center of each texel also near
+it: faster and less exact.
 
 Returns
 -------

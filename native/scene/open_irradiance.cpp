@@ -32,8 +32,8 @@ std::array<double, 4> spline_weights(double t)
 
 }  // namespace
 
-OpenIrradiance::OpenIrradiance(const ReceiverGrid& grid, const Light& light)
-    : m_grid(grid), m_light(light), m_pitch(std::max(grid.pitch_x, grid.pitch_y))
+OpenIrradiance::OpenIrradiance(const ReceiverGrid& grid, const Light& light, bool at_centers)
+    : m_grid(grid), m_light(light), m_pitch(std::max(grid.pitch_x, grid.pitch_y)), m_at_centers(at_centers)
 {
     if (grid.is_bent())
         return;
@@ -81,7 +81,7 @@ Vec3 OpenIrradiance::in_texel(double x, double y, const Vec3& normal, double pit
     const auto at = [&](double sub_x, double sub_y) {
         return m_light.irradiance(m_grid.point(x + sub_x, y + sub_y), normal);
     };
-    if (m_light.distance_from(m_grid.point(x, y)) > texels_to_even_light * pitch)
+    if (m_at_centers || m_light.distance_from(m_grid.point(x, y)) > texels_to_even_light * pitch)
         return at(0.5, 0.5);
     // The Gauss rule of two points along each axis.
     constexpr double offset = 0.5 / std::numbers::sqrt3;

@@ -12,8 +12,8 @@ namespace beamspread {
 // mesh of many faces takes time. Where the receiver bends it is computed at each texel.
 class OpenIrradiance {
 public:
-    // The arguments must outlive the object.
-    OpenIrradiance(const ReceiverGrid& grid, const Light& light);
+    // The first two must outlive the object. `at_centers`: see RaySettings.
+    OpenIrradiance(const ReceiverGrid& grid, const Light& light, bool at_centers);
 
     // Mean irradiance of texel (x, y), W/m^2 in each channel.
     Vec3 at(std::size_t x, std::size_t y) const;
@@ -27,6 +27,7 @@ private:
     const ReceiverGrid& m_grid;
     const Light& m_light;
     double m_pitch;
+    bool m_at_centers;
     Vec3 m_everywhere{0.0};  // irradiance by a light infinitely far away
     std::size_t m_columns = 0;
     std::vector<Vec3>

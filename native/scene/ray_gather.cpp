@@ -40,7 +40,7 @@ public:
         : m_grid(grid),
           m_prepared(grid.is_bent() ? light.facing_all() : light.facing(grid.normal)),
           m_light(m_prepared ? *m_prepared : light),
-          m_open(grid, m_light),
+          m_open(grid, m_light, settings.at_centers),
           m_occluders(occluders),
           m_with_travel(settings.with_travel),
           m_is_coherent(!m_light.corners().empty()),

@@ -57,6 +57,8 @@ struct RaySettings {
     // Lights of a size: rays of a first pass. They are enough in texels that, with their neighbors, see only light or only
     // obstacles, and in all texels without occluders. 0: no first pass.
     int even_rays = 0;
+    // Lights of a size: true takes their falloff at a texel's center also near them, which is faster and less exact.
+    bool at_centers = false;
     std::uint32_t seed = 0;
     // Height above the plane where shadow rays start, metres, besides what rounding needs: the largest distance of the
     // receiver's own faces to the plane, where they are among the occluders. Where the receiver bends, the height above the

@@ -11,7 +11,7 @@ from beamspread.core.bake.runner import Bake
 from beamspread.core.bake.surface import Surface
 from beamspread.core.material import Material
 from beamspread.core.scene.illumination import Mesh
-from beamspread.core.scene.lights import PointLight, SunLight
+from beamspread.core.scene.lights import AreaLight, PointLight, SunLight
 from beamspread.core.target import Target
 
 from bakes import SETTINGS, bake_job, square
@@ -48,6 +48,19 @@ def test_a_sun_arrives_with_its_cosine_colour_and_direction():
     irradiance, direction = arriving(SUN)
     assert irradiance == pytest.approx(np.broadcast_to([1, 0.5, 0.25], irradiance.shape), rel=ROUNDING)
     assert direction == pytest.approx(np.broadcast_to(travel(60, 30), direction.shape), abs=ROUNDING)
+
+
+def test_means_take_the_falloff_at_the_centers_of_texels():
+    """Those of coarse texels are the centers of texels nine times as fine, which the light is far from."""
+    area = AreaLight("Area", 10.0, (1.0, 1.0, 1.0), True, (0.06, 0.06, 0.1), np.eye(3), 0.05, 0.05, False, math.pi)
+
+    def irradiance(grid, **options):
+        arriving = [(area.at(grid), [1.0] * 3, None)]
+        return beamspread.native.bake_arrival(grid.surface(), arriving, rays=64, **options)[0]
+
+    coarse, fine = square(9), irradiance(square(81))[4::9, 4::9]
+    np.testing.assert_allclose(irradiance(coarse, at_centers=True), fine, rtol=0.01)
+    assert np.abs(irradiance(coarse) / fine - 1).max() > 0.05
 
 
 def test_light_of_several_lights_adds_up_and_its_ways_are_weighed_with_its_power():

@@ -16,7 +16,7 @@ from ..scene.grid import Grid
 from ..scene.lights import STRATA, BentField, Field, FieldLight
 from .job import BakeJob, Step
 from .layers import WITHOUT_MEDIUM
-from .mean_light import mean_irradiance, mean_open_irradiance
+from .mean_light import SHADOW_TEXELS, mean_irradiance, mean_open_irradiance
 from .smoothing import SPLINE_VARIANCE, smoothing_variance
 from .surroundings import bounced_seconds
 
@@ -44,6 +44,8 @@ BARE_TIME = 2.0
 
 # Fraction of the unoccluded direct light below which bounced light is ignored. Leaks into a closed box are 1.3e-7.
 NEGLIGIBLE = 1e-6
+# Texels along a side from which that light is found.
+FEW_TEXELS = 16
 NOTHING_BOUNCES = warning(
     "", "Indirect light is left out: it is less than a millionth of what the lights send without obstacles."
 )
@@ -91,7 +93,7 @@ class BouncedLight(Step):
             STRATA,
             lights,
             surfaces,
-            direct=mean_over(grids, lambda grid: mean_irradiance(grid, illumination)),
+            direct=mean_over(grids, lambda grid: mean_irradiance(grid, illumination, min(self.nodes, SHADOW_TEXELS))),
             tolerance=self.tolerance * (BARE if _is_bare(job) else 1.0),
             max_bounces=self.max_bounces,
             threads=settings.threads,
@@ -102,7 +104,7 @@ class BouncedLight(Step):
         )
         if not bounced["irradiance"] > 0:
             return job
-        in_the_open = mean_over(grids, lambda grid: mean_open_irradiance(grid, illumination.lights))
+        in_the_open = mean_over(grids, lambda grid: mean_open_irradiance(grid, illumination.lights, FEW_TEXELS))
         if bounced["irradiance"] < NEGLIGIBLE * in_the_open:
             return replace(job, illumination=illumination.with_messages(NOTHING_BOUNCES))
         if bounced["noise"] > NOISY * self.tolerance:

@@ -40,7 +40,7 @@ def irradiance_map(
     light = light.coarse(MEAN_WORLD_ROWS) if isinstance(light, WorldLight) else light
     caster = illumination.caster(grid, light) if has_shadows and light.cast_shadow else None
     arriving = [(light.at(coarse), light.rgb().tolist(), caster)]
-    return native.bake_arrival(coarse.surface(), arriving, samples=1, rays=SHADOW_RAYS)[0].mean(axis=-1)
+    return _irradiance(coarse, arriving, SHADOW_RAYS).mean(axis=-1)
 
 
 def _mean_irradiance(grid: AnyGrid, illumination: Illumination, texels: int, rays: int) -> float:
@@ -53,5 +53,8 @@ def _mean_irradiance(grid: AnyGrid, illumination: Illumination, texels: int, ray
         for light in lights
         if not light.is_behind(coarse)
     ]
-    irradiance, _ = native.bake_arrival(coarse.surface(), arriving, samples=1, rays=rays)
-    return coarse.mean(irradiance)
+    return coarse.mean(_irradiance(coarse, arriving, rays))
+
+
+def _irradiance(coarse: AnyGrid, arriving: list, rays: int) -> np.ndarray:
+    return native.bake_arrival(coarse.surface(), arriving, samples=1, rays=rays, at_centers=True)[0]
