@@ -3,7 +3,7 @@
 import bpy
 from bpy.props import BoolProperty, EnumProperty, FloatProperty, IntProperty, PointerProperty, StringProperty
 
-from ..core.bake.bake_settings import OUTPUTS, BakeSettings
+from ..core.bake.bake_settings import MAX_SAMPLES, OUTPUTS, BakeSettings
 from ..core.bake.spread import side_for
 from ..core.bake.surface import Surface
 from . import compat, preferences
@@ -111,7 +111,7 @@ class BeamspreadSettings(bpy.types.PropertyGroup):
         default=4,
         min=1,
         soft_max=16,
-        max=64,
+        max=MAX_SAMPLES,
     )
     margin: IntProperty(
         name="Margin",

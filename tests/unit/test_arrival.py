@@ -11,7 +11,7 @@ from beamspread.core.bake.runner import Bake
 from beamspread.core.bake.surface import Surface
 from beamspread.core.material import Material
 from beamspread.core.scene.illumination import Mesh
-from beamspread.core.scene.lights import AreaLight, PointLight, SunLight
+from beamspread.core.scene.lights import AreaLight, PointLight, SunLight, WorldLight
 from beamspread.core.target import Target
 
 from bakes import SETTINGS, bake_job, square
@@ -162,3 +162,22 @@ def test_a_medium_that_absorbs_all_light_is_not_dark():
     assert not one.texture.any()
     assert not one.is_dark
     assert not one.messages
+
+
+@pytest.mark.parametrize(("width", "remedy"), [(0.3, "Raise Samples to "), (0.004, "Widen the gaps")])
+def test_noise_of_light_through_gaps_is_named_with_a_way_out_that_helps(width, remedy):
+    """Below a plate with a slit; the number of samples that is named is enough."""
+    rows = tuple(map(tuple, np.eye(3)))
+    world = WorldLight("World", 1.0, (1.0, 1.0, 1.0), True, np.ones((4, 8, 3), np.float32), rows)
+    corners = [(x, y, 1.0) for x0, x1 in ((-30, -width / 2), (width / 2, 30)) for x in (x0, x1) for y in (-30, 30)]
+    plate = Mesh(np.array(corners, float), np.array([[0, 1, 2], [1, 3, 2], [4, 5, 6], [5, 7, 6]], np.uint32))
+
+    def noise_of(samples):
+        settings = replace(SETTINGS, samples=samples, layer=IRRADIANCE)
+        done = bake_job([world], plate, Surface(MATERIAL), settings, square(SIZE)).run()
+        return [message for message in done.illumination.messages if "of noise" in message.text]
+
+    (message,) = noise_of(4)
+    assert message.remedy.startswith(remedy)
+    if remedy.startswith("Raise"):
+        assert not noise_of(int(message.remedy.strip(".").rsplit(" ", 1)[1]))

@@ -13,6 +13,9 @@ PREVIEW, FINAL = "preview", "final"
 OUTPUTS = {"LUMINANCE": COMBINED, "IRRADIANCE": IRRADIANCE, "DIRECTION": DIRECTION}
 """Layers by their names for users."""
 
+MAX_SAMPLES = 64
+"""Largest number of samples, see `BakeSettings.samples`."""
+
 EXTEND, ADJACENT_FACES = "EXTEND", "ADJACENT_FACES"
 """Margins that continue each island, and margins with the light beyond the edges of islands."""
 

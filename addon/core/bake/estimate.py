@@ -15,9 +15,9 @@ from ..scene.bent_grid import AnyGrid, BentGrid
 from ..scene.lights import STRATA, AreaLight, Light, MeshLight, WorldLight
 from .bake_settings import BakeSettings
 from .edges import texels_with_images
-from .layers import RAYS_PER_SAMPLE, WITHOUT_MEDIUM
+from .layers import WITHOUT_MEDIUM, rays_without_medium
 from .mean_light import mean_open_irradiance
-from .spread_light import MAX_RAYS_BY_SAMPLES, MIN_RAYS, backs_of, has_back, rays_per_texel
+from .spread_light import MIN_RAYS, backs_of, has_back, rays_per_texel
 from .surface import Surface
 
 # The rates are seconds of one thread, fitted to bakes by tests/bench/estimates.py. Larger: longer estimates.
@@ -290,8 +290,8 @@ def _rays(
     `unknown`: as for `Workload.of`.
     """
     if settings.layer in WITHOUT_MEDIUM:
-        rays = min(RAYS_PER_SAMPLE * settings.samples**2, MAX_RAYS_BY_SAMPLES)
-        return _traced(rays), [(light, _traced(rays)) for light in lights]
+        rays = _traced(rays_without_medium(settings))
+        return rays, [(light, rays) for light in lights]
     rays = rays_per_texel(grid, surface.material, settings)
     if len(lights) == 1 or not any(light.has_size for light in lights):
         return _traced(rays), [(light, _traced(rays * (1 - unknown))) for light in lights]

@@ -110,12 +110,17 @@ def arrive(
         grid.surface(),
         illumination.native_lights(grid),
         samples=settings.samples,
-        rays=min(RAYS_PER_SAMPLE * settings.samples**2, MAX_RAYS_BY_SAMPLES),
+        rays=rays_without_medium(settings),
         threads=settings.threads,
         progress=progress,
         report_noise=report,
     )
     return irradiance, flow * grid.handedness if isinstance(grid, BentGrid) else flow
+
+
+def rays_without_medium(settings: BakeSettings) -> int:
+    """How many rays of each texel irradiance and direction take to each light of a size."""
+    return min(RAYS_PER_SAMPLE * settings.samples**2, MAX_RAYS_BY_SAMPLES)
 
 
 def mean_direction(flow: np.ndarray) -> np.ndarray:

@@ -11,13 +11,14 @@ from ..errors import BakeError
 from ..ldf.library import SIMULATING, is_known, library
 from ..messages import Message, note
 from ..progress import Progress
-from .bake_settings import BakeSettings
+from .bake_settings import MAX_SAMPLES, BakeSettings
 from .bent_limits import bent_messages
 from .edges import texels_with_images, with_edges
 from .estimate import simulation_seconds, textured_seconds
 from .finish import finished_texture
 from .job import BakeJob, Step
-from .layers import LAYERS, WITHOUT_MEDIUM
+from .layers import LAYERS, WITHOUT_MEDIUM, rays_without_medium
+from .spread_light import MAX_RAYS_BY_SAMPLES, rays_per_texel
 from .spreading import FINAL_EFFORT, Reports
 from .surface import Surface
 from .textured_bake import noisy_note
@@ -139,7 +140,7 @@ class Solve(Step):
         if max(textures) > FINAL_EFFORT.noise:
             job = replace(job, illumination=job.illumination.with_messages(noisy_note(job.name, max(textures))))
         if noise.relative() > MAX_NOISE:
-            job = replace(job, illumination=job.illumination.with_messages(_noisy(job.name, noise.relative())))
+            job = replace(job, illumination=job.illumination.with_messages(_noisy(job, noise.relative())))
         if not all(np.isfinite(on_grid).all() for on_grid in values):
             text = "The bake produced values that are not numbers."
             raise BakeError(text, "Check the strengths of the lights.")
@@ -172,9 +173,20 @@ BAKE_STEPS = (Simulate(), Solve())
 """Steps of a job whose light and colors are known."""
 
 
-def _noisy(name: str, noise: float) -> Message:
-    text = f"Direct light on '{name}' has {100 * noise:.0f} % of noise, relative to all light there. Few rays find it."
-    return note(name, text, "Raise Samples.")
+def _noisy(job: BakeJob, noise: float) -> Message:
+    text = (
+        f"Direct light on '{job.name}' has {100 * noise:.0f} % of noise, relative to all light there. Few rays find it."
+    )
+    # Rays grow with the square of the samples, and noise that few of them see falls with their root.
+    growth, settings = noise / MAX_NOISE, job.settings
+    if settings.layer in WITHOUT_MEDIUM:
+        rays = rays_without_medium(settings)
+    else:
+        rays = rays_per_texel(job.receiver.charts[0].grid, job.surface.material, settings)
+    samples = math.ceil(settings.samples * growth)
+    if samples <= MAX_SAMPLES and rays * growth**2 <= MAX_RAYS_BY_SAMPLES:
+        return note(job.name, text, f"Raise Samples to {samples}.")
+    return note(job.name, text, "Widen the gaps through which it comes: more samples would not be enough.")
 
 
 def textured_texels(job: BakeJob) -> int:
