@@ -16,6 +16,7 @@ from beamspread.core.live import library_service
 from beamspread.core.live.framed_receiver import FramedReceiver
 from beamspread.core.live.library_service import LibraryService
 from beamspread.core.live.live_target import LiveTarget
+from beamspread.core.live.render_thread import Work
 from beamspread.core.live.renderer import SIDES, for_live, quick_side
 from beamspread.core.material import Material
 from beamspread.core.scene.flat_mesh import flatten
@@ -190,6 +191,18 @@ def test_a_forgotten_target_is_rendered_again(thread):
 def test_an_error_is_handed_over(thread):
     thread.show([live_target(LAMP, albedo=(1.0, 0.5, 0.5))])
     wait_for(lambda: any("albedo" in rendering.error for rendering in thread.take().values()))
+
+
+def test_an_error_of_an_exact_rendering_is_handed_over(thread, tmp_path):
+    """As of samples whose folder goes while the target rests."""
+    target = live_target(LAMP)
+    target = replace(
+        target, settings=replace(target.settings, distributions="angular", sample_folder=str(tmp_path / "gone"))
+    )
+    work = thread._work[target.target] = Work()
+    thread._render_exactly(target, work, lambda _: True)
+    (rendering,) = thread.take().values()
+    assert "There is no folder" in rendering.error
 
 
 @pytest.fixture

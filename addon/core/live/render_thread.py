@@ -187,10 +187,13 @@ class RenderThread:
             work.bounced_key = work.key
 
     def _render_exactly(self, target: LiveTarget, work: Work, progress: Progress) -> None:
-        if self._renderer.quick_side(target) < SIDES[-1] < max(self._renderer.size_of(target)):
-            # The exact rendering of a large image may take long.
-            self._put(work, target, lambda: self._renderer.quick(target, SIDES[-1], progress))
-        self._put(work, target, lambda: self._renderer.exact(target, progress))
+        def render() -> Rendering:
+            if self._renderer.quick_side(target) < SIDES[-1] < max(self._renderer.size_of(target)):
+                # The exact rendering of a large image may take long.
+                self._renderings.put((work, self._renderer.quick(target, SIDES[-1], progress)))
+            return self._renderer.exact(target, progress)
+
+        self._put(work, target, render)
         work.is_exact = True
 
     def _put(self, work: Work, target: LiveTarget, render: Callable[[], Rendering]) -> bool:
