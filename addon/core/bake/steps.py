@@ -18,7 +18,7 @@ from .estimate import simulation_seconds, textured_seconds
 from .finish import finished_texture
 from .job import BakeJob, Step
 from .layers import LAYERS, WITHOUT_MEDIUM, rays_without_medium
-from .spread_light import MAX_RAYS_BY_SAMPLES, rays_per_texel
+from .spread_light import rays_per_texel
 from .spreading import FINAL_EFFORT, Reports
 from .surface import Surface
 from .textured_bake import noisy_note
@@ -177,16 +177,23 @@ def _noisy(job: BakeJob, noise: float) -> Message:
     text = (
         f"Direct light on '{job.name}' has {100 * noise:.0f} % of noise, relative to all light there. Few rays find it."
     )
-    # Rays grow with the square of the samples, and noise that few of them see falls with their root.
-    growth, settings = noise / MAX_NOISE, job.settings
+    # The noise of light that few rays find falls with the root of their number.
+    wanted = _rays(job, job.settings.samples) * (noise / MAX_NOISE) ** 2
+    enough = (samples for samples in range(job.settings.samples + 1, MAX_SAMPLES + 1) if _rays(job, samples) >= wanted)
+    samples = next(enough, None)
+    if samples is not None:
+        return note(job.name, text, f"Raise Samples to {samples}.")
+    return note(job.name, text, "Widen the gaps through which it comes: more samples would not be enough.")
+
+
+def _rays(job: BakeJob, samples: int) -> int:
+    """How many rays of each texel go to a light of a size: a power of two, see native/scene/ray_gather.h."""
+    settings = replace(job.settings, samples=samples)
     if settings.layer in WITHOUT_MEDIUM:
         rays = rays_without_medium(settings)
     else:
         rays = rays_per_texel(job.receiver.charts[0].grid, job.surface.material, settings)
-    samples = math.ceil(settings.samples * growth)
-    if samples <= MAX_SAMPLES and rays * growth**2 <= MAX_RAYS_BY_SAMPLES:
-        return note(job.name, text, f"Raise Samples to {samples}.")
-    return note(job.name, text, "Widen the gaps through which it comes: more samples would not be enough.")
+    return 1 << (rays.bit_length() - 1)
 
 
 def textured_texels(job: BakeJob) -> int:
