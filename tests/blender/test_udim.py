@@ -282,6 +282,19 @@ def test_a_tiled_bake_is_up_to_date_until_something_changes(tmp_path):
     assert "image file (missing)" in str(row.messages[0])
 
 
+@pytest.mark.parametrize("is_relative", [False, True])
+def test_tiles_keep_the_path_that_the_artist_gave_them(tmp_path, is_relative):
+    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "scene.blend"))
+    image = tiled_image(tmp_path)
+    if is_relative:
+        image.filepath = bpy.path.relpath(image.filepath)
+    path = image.filepath
+    assert path.startswith("//") == is_relative
+    scenes.select(four_planes(image))
+    assert bpy.ops.beamspread.bake() == {"FINISHED"}
+    assert image.filepath == path
+
+
 def test_tiles_of_another_scene_stay(tmp_path):
     """After Save As, the new scene's first bake makes files of its own."""
     bpy.context.scene.beamspread.use_udim, bpy.context.scene.beamspread.resolution = True, 32

@@ -129,6 +129,7 @@ def store_new(name: str, texture: np.ndarray, bake: Bake, is_data: bool = False)
     image = bpy.data.images.load(str(file_of_tile(path, first)))
     image.name = free_name(name)
     image.source = "TILED"
+    point_to(image, path)  # Blender has made it absolute
     image.colorspace_settings.is_data = is_data
     _show_files(image, path, tiling)
     return str(path), image
@@ -165,7 +166,8 @@ def check_folder() -> None:
 def _show_files(image, path: Path, tiling: Tiling) -> None:
     """Have the image show the files of all of its tiles and of these."""
     wanted = {tile.number for tile in image.tiles} | set(tiling.sizes)
-    point_to(image, path)  # Blender makes the path of a new tiled image absolute
+    if file_of(image) != path:
+        point_to(image, path)
     for number in sorted(wanted - {tile.number for tile in image.tiles}):
         image.tiles.new(tile_number=number)
     icons.reload(image)
