@@ -81,6 +81,9 @@ def test_an_image_of_ones_own_is_filled_by_the_map_of_blenders_bake(uv_map):
     assert filled[inside] == pytest.approx(expected[inside], abs=1e-6)
 
 
+REFUSED = "Blender's Bake fills the UV map 'UVMap', and the node shows its image by 'Second'."
+
+
 def test_a_nodes_image_is_refused_by_another_map_than_it_is_shown_by():
     plane = scenes.add_plane(material=scenes.add_material())
     scenes.add_sun(40, 30)
@@ -88,10 +91,37 @@ def test_a_nodes_image_is_refused_by_another_map_than_it_is_shown_by():
     image = node.image = add_active_image(plane.data.materials[0])
     scenes.select(plane)
     message = scenes.messages_of(lambda: bpy.ops.object.bake(type="COMBINED"))
-    assert "Blender's Bake fills the UV map 'UVMap', and the node shows its image by 'Second'." in message
+    assert REFUSED in message
     plane.data.uv_layers.active = plane.data.uv_layers["Second"]
     assert bpy.ops.object.bake(type="COMBINED") == {"FINISHED"}
     assert scenes.pixels(image)[:, :16].all()
+
+
+@pytest.mark.parametrize("is_chosen", [False, True], ids=["by the bake", "by the node"])
+def test_the_button_refuses_a_nodes_image_by_another_map_before_blender_clears_it(is_chosen):
+    plane = scenes.add_plane(material=scenes.add_material())
+    scenes.add_sun(40, 30)
+    node = with_second_map(plane)
+    image = node.image = add_active_image(plane.data.materials[0])
+    before = scenes.bake(plane)[0]
+    assert before[:, :16].all()
+    if not is_chosen:
+        node.uv_map = ""
+    assert REFUSED in scenes.messages_of(bpy.ops.beamspread.bake_active)
+    assert any(REFUSED in reason for reason in refusals(bpy.context).values())
+    np.testing.assert_array_equal(scenes.pixels(image), before)
+
+
+def test_a_copy_of_the_nodes_map_is_the_same_map():
+    plane = scenes.add_plane(material=scenes.add_material())
+    scenes.add_sun(40, 30)
+    plane.data.uv_layers.new(name="Copy")
+    node = scenes.node_of(plane.data.materials[0])
+    node.uv_map, node.image = "Copy", add_active_image(plane.data.materials[0])
+    scenes.select(plane)
+    for bake in (bpy.ops.object.bake, bpy.ops.beamspread.bake_active):
+        assert scenes.messages_of(bake) == ""
+        assert scenes.pixels(node.image).all()
 
 
 class Stopping:

@@ -225,11 +225,20 @@ def keep_map(tree, name: str) -> None:
 
 def show_map_for_now(tree, name: str) -> None:
     """Show the image by the UV map of that name until `show_own_images_in`."""
-    node = tree.nodes.get(UV_MAP)
-    shown = "" if node is None else getattr(node, "uv_map", None) or getattr(node, "attribute_name", "")
+    shown = _shown_map(tree)
     if name != shown:
         tree[FORMER_MAP] = tree.get(FORMER_MAP, shown)
         show_map(tree, name)
+
+
+def _shown_map(tree) -> str:
+    node = tree.nodes.get(UV_MAP)
+    return "" if node is None else getattr(node, "uv_map", None) or getattr(node, "attribute_name", "")
+
+
+def own_map(tree) -> str:
+    """Name of the UV map by which the tree shows the node's own image; "" is the one that renders."""
+    return tree.get(FORMER_MAP, _shown_map(tree))
 
 
 def show_own_images_in(tree, node) -> None:

@@ -20,6 +20,7 @@ from ... import popup
 from ...images.udim import is_tiled
 from ...node.find import BakeTarget, targets_of
 from ...node.output import former_output
+from ...node.tree import own_map
 from ...read.nodes import Links
 from ...registration import all_or_nothing, classes, handlers
 
@@ -64,6 +65,33 @@ def check_active_image(target: BakeTarget, settings: BakeSettings, is_running: b
         )
 
 
+def other_map(uv_map: str, own: str) -> ImageError:
+    """The error about a node's image that Blender would fill by another UV map than the node shows it by."""
+    return ImageError(
+        f"Blender's Bake fills the UV map '{uv_map}', and the node shows its image by '{own}'.",
+        "Use Beamspread's own Bake, or make that map active (Object Data Properties > UV Maps).",
+    )
+
+
+def _check_map(target: BakeTarget) -> None:
+    """Raise ImageError if the active image is the node's, and the active UV map is another than the node's."""
+    layers, tree = target.obj.data.uv_layers, target.node.node_tree
+    if target.image is None or target.image != active_image(target.material):
+        return
+    name = target.node.uv_map or ("" if tree is None else own_map(tree))
+    own = layers.get(name) if name else next((layer for layer in layers if layer.active_render), None)
+    if own is None or layers.active is None or own.name == layers.active.name:
+        return
+    if not np.array_equal(_uvs(own), _uvs(layers.active)):
+        raise other_map(layers.active.name, own.name)
+
+
+def _uvs(layer) -> np.ndarray:
+    uvs = np.empty(2 * len(layer.data), np.float32)
+    layer.data.foreach_get("uv", uvs)
+    return uvs
+
+
 def _reader(image, target: BakeTarget) -> str:
     """Words for the node whose inputs read the image: the Beamspread node, or the material's former shader; or ""."""
     node = target.node
@@ -102,8 +130,11 @@ def textures_at_risk(context) -> list[str]:
     return list(found.values())
 
 
-def refusals(context) -> dict:
-    """Images that Blender would clear although no bake may fill them, each with the reason, by the selected objects."""
+def refusals(context, by_active_map: bool = True) -> dict:
+    """Images that Blender would clear although no bake may fill them, each with the reason, by the selected objects.
+
+    `by_active_map`: True if Blender fills the active UV map, False if its operator may name another.
+    """
     settings, found = context.scene.beamspread.for_bake(), {}
     for obj in list(context.view_layer.objects.selected)[:MAX_OBJECTS]:
         if obj.type != "MESH":
@@ -112,6 +143,8 @@ def refusals(context) -> dict:
         for target in targets:
             try:
                 check_active_image(target, settings)
+                if by_active_map:
+                    _check_map(target)
             except ImageError as error:
                 found[active_image(target.material)] = str(error)
         known = {target.material for target in targets}
@@ -218,7 +251,7 @@ _saved = _Saved()
 @persistent
 def _before_bake(*_arguments) -> None:
     if bpy.context.scene.render.engine == ENGINE:
-        _saved.take(refusals(bpy.context))
+        _saved.take(refusals(bpy.context, by_active_map=False))
 
 
 def _after_script(*_arguments) -> None:

@@ -13,7 +13,7 @@ from bpy.app.handlers import persistent
 
 from ....core.bake.bake_settings import COMBINED
 from ....core.bake.runner import WRITTEN, Bake, Sink, run_bakes
-from ....core.errors import BakeError, text_of
+from ....core.errors import text_of
 from ....core.progress import Progress
 from ....core.target import BACK, Target
 from ... import compat
@@ -24,7 +24,7 @@ from ...registration import all_or_nothing, classes, handlers
 from ..out_of_date import stale
 from ..out_of_date.fingerprint import Parts
 from ..state import state
-from .active_image import ENGINE, active_image, check_active_image
+from .active_image import ENGINE, active_image, check_active_image, other_map
 from .bake_plan import BakePlan, FailedPlan, Plan, read_plans
 from .render_copy import render_picture, show_by_eevee
 
@@ -106,25 +106,24 @@ def _prepare(engine, depsgraph, obj, passes, size: tuple[int, int]) -> list[Bake
         check = partial(Progress(lambda _: not engine.test_break()).check, 0.0)
         arguments = None, None, size, fillings.copy, None, check
         plans = read_plans(depsgraph, [target.name for target in targets], *arguments)
-        plans = _in_map_of_blender(plans, depsgraph, obj, _baked_map(obj, passes, *size), arguments)
+        plans = _in_map_of_blender(plans, depsgraph, obj, _baked_maps(obj, passes, *size), arguments)
         bakes = [plan.bake(settings) for plan in plans] or find_misplaced([obj])
     except Exception as error:  # noqa: BLE001 - Blender would swallow it
         return [Bake(Target(obj.name), error=error)]
     return bakes or [Bake(Target(obj.name), error=NOTHING_FOUND)]
 
 
-def _in_map_of_blender(plans: list[Plan], depsgraph, obj, uv_map: str, arguments: tuple) -> list[Plan]:
+def _in_map_of_blender(plans: list[Plan], depsgraph, obj, uv_maps: list[str], arguments: tuple) -> list[Plan]:
     """Plans of bakes in the UV map that Blender's Bake fills; of failures where the node shows its image by another."""
     result = []
     for plan in plans:
-        if not isinstance(plan, BakePlan) or uv_map in ("", own := plan.mesh.uv_map or _rendered_map(obj)):
+        own = plan.mesh.uv_map or _rendered_map(obj) if isinstance(plan, BakePlan) else ""
+        if not (own and uv_maps) or own in uv_maps:
             result.append(plan)
         elif image_of(plan.target) == active_image(bpy.data.materials[plan.target.material_name]):
-            text = f"Blender's Bake fills the UV map '{uv_map}', and the node shows its image by '{own}'."
-            remedy = "Use Beamspread's own Bake, or make that map active (Object Data Properties > UV Maps)."
-            result.append(FailedPlan(plan.target, BakeError(text, remedy)))
+            result.append(FailedPlan(plan.target, other_map(uv_maps[0], own)))
         else:
-            result += read_plans(depsgraph, [plan.target], *arguments, uv_map=uv_map)
+            result += read_plans(depsgraph, [plan.target], *arguments, uv_map=uv_maps[0])
     return result
 
 
@@ -133,8 +132,11 @@ def _rendered_map(obj) -> str:
     return next((layer.name for layer in getattr(obj.data, "uv_layers", ()) if layer.active_render), "")
 
 
-def _baked_map(obj, passes, width: int, height: int) -> str:
-    """Name of the UV map that Blender's Bake fills, as its texels tell: the active one or an argument's; or ""."""
+def _baked_maps(obj, passes, width: int, height: int) -> list[str]:
+    """Name of the UV map that Blender's Bake fills, the active one or an argument's, as its texels tell.
+
+    Maps with the same UVs come together; no texels of the object tell nothing.
+    """
     triangles, weights = compat.baked_points(passes, width, height)
     rows, columns = np.nonzero(triangles >= 0)
     step = max(len(rows) // MAX_PROBED, 1)
@@ -146,7 +148,7 @@ def _baked_map(obj, passes, width: int, height: int) -> str:
         mesh.loop_triangles.foreach_get("loops", loops)
         chosen = triangles[rows, columns]
         if not len(chosen) or chosen.max() >= len(mesh.loop_triangles):
-            return ""
+            return []
         corners, (u, v) = loops.reshape(-1, 3)[chosen], weights[rows, columns].T
         at = np.column_stack([(columns + 0.5) / width, (rows + 0.5) / height])
         distances = {}
@@ -157,8 +159,8 @@ def _baked_map(obj, passes, width: int, height: int) -> str:
             distances[layer.name] = float(np.median(np.abs((shown - at + 0.5) % 1 - 0.5)))
     finally:
         obj.to_mesh_clear()
-    nearest = min(distances, key=distances.get, default="")
-    return nearest if nearest and distances[nearest] < 1 / min(width, height) else ""
+    nearest = min(distances.values(), default=1.0)
+    return [name for name, distance in distances.items() if distance == nearest < 1 / min(width, height)]
 
 
 def _fills_own_image(bake: Bake) -> bool:
