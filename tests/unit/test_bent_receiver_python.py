@@ -112,6 +112,7 @@ def test_doubled_faces_and_faces_that_look_to_the_other_side_are_named():
     normals = np.where((np.arange(polygons.count) % 2 == 0)[:, None], -polygons.normals, polygons.normals)
     (text,) = [str(message) for message in grid_of(replace(polygons, normals=normals))[2].messages]
     assert text.startswith("Faces of 'Ball' that touch look to opposite sides, at ")
+    assert " edges: light can't be right there. Recalculate the normals (Edit Mode: Shift N)" in text
 
 
 def test_faces_without_an_area_in_the_map_are_named_and_overlaps_refused():

@@ -155,8 +155,9 @@ def _faults(polygons: Polygons, name: str) -> list[Message]:
     is_told = (meetings[first] == 1) & (meetings[second] == 1) & (looks[first] * looks[second] != 0)  # by an area
     is_wrong = (is_same_way == (looks[first] == looks[second])) & is_told
     if is_wrong.sum() > MIN_FAULT * len(first):
-        text = f"Faces of '{name}' that touch look to opposite sides, at {is_wrong.sum()} of {len(first)} edges."
-        remedy = "Light can't be right there. Recalculate the normals (Edit Mode: Shift N), or check modifiers."
+        where = f"at {is_wrong.sum()} of {len(first)} edges: light can't be right there."
+        text = f"Faces of '{name}' that touch look to opposite sides, {where}"
+        remedy = "Recalculate the normals (Edit Mode: Shift N), or check modifiers."
         messages.append(warning(name, text, remedy))
     counts = np.bincount(same_faces(polygons))
     is_double = counts[same_faces(polygons)] > 1
