@@ -103,6 +103,6 @@ def _beside(mask: np.ndarray, steps: Sequence[tuple[int, int]]) -> np.ndarray:
 
 def add_rings(texture: np.ndarray, known: np.ndarray, count: int) -> np.ndarray:
     """A copy with `count` rings around the known texels filled, each with the mean of its known neighbours."""
-    result = np.array(texture, np.float32)
+    result = np.array(texture, np.float32, order="C")
     native.fill_rings(result, np.ascontiguousarray(known), count)
     return result
