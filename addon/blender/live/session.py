@@ -40,6 +40,9 @@ CALM_SECONDS = 0.3
 CYCLES_PAUSE_SECONDS = 1.0
 """Seconds between two previews for Cycles while renderings are still to come; more restarts it less often."""
 
+SHADED = {"MATERIAL", "RENDERED"}
+"""Shading of 3D Views that show previews."""
+
 ImageKey = tuple[str, str]
 """Name of a material and a side, see `Target.image_key`."""
 
@@ -282,7 +285,7 @@ class Session:
         previews = [self._previews.get(target.target.image_key) for target in self._targets]
         if None in previews or not all(preview.is_shown() for preview in previews) or is_seen_by_cycles(context):
             return
-        if time.perf_counter() < self._waits_after:
+        if time.perf_counter() < self._waits_after or not is_looked_at(context):
             return
         if not self._thread.await_quick(WAIT_SECONDS):
             self._waits_after = time.perf_counter() + PAUSE_SECONDS
@@ -380,6 +383,14 @@ def is_painting(context) -> bool:
     """True while the active object's textures are painted on."""
     obj = context.view_layer.objects.active
     return obj is not None and obj.mode == "TEXTURE_PAINT"
+
+
+def is_looked_at(context) -> bool:
+    """True if a window has a 3D View in Material Preview or Rendered, or if there are no windows."""
+    areas = (area for window in context.window_manager.windows for area in window.screen.areas)
+    return bpy.app.background or any(
+        area.type == "VIEW_3D" and area.spaces.active.shading.type in SHADED for area in areas
+    )
 
 
 def is_seen_by_cycles(context) -> bool:

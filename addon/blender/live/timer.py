@@ -12,12 +12,10 @@ from ..node.tree import release_images
 from ..read.scene_cache import listeners
 from ..registration import all_or_nothing, handlers
 from .preview import remove_strays
-from .session import Session
+from .session import Session, is_looked_at
 
 BUSY_SECONDS, IDLE_SECONDS, OFF_SECONDS = 0.01, 0.05, 0.5
 """Seconds between steps: while something changes or is rendered, while nothing does, and while Live is off."""
-
-SHADED = {"MATERIAL", "RENDERED"}
 
 
 class _Live:
@@ -60,7 +58,7 @@ def step(context) -> float:
         return OFF_SECONDS
     if live.session is not None and live.session.rests(context):
         return IDLE_SECONDS
-    if not bpy.app.background and not is_looked_at(context):
+    if not is_looked_at(context):
         return IDLE_SECONDS
     if live.session is None:
         live.session, live.scene_name, live.failure, live.was_on = Session(), scene.name, "", True
@@ -72,12 +70,6 @@ def end(can_remove: bool = True) -> None:
     session, live.session = live.session, None
     if session is not None:
         session.end(can_remove)
-
-
-def is_looked_at(context) -> bool:
-    """True if a window has a 3D View in Material Preview or Rendered."""
-    areas = (area for window in context.window_manager.windows for area in window.screen.areas)
-    return any(area.type == "VIEW_3D" and area.spaces.active.shading.type in SHADED for area in areas)
 
 
 def _remove_strays() -> None:
