@@ -3,6 +3,7 @@
 from dataclasses import replace
 
 import beamspread
+import bmesh
 import bpy
 import pytest
 from beamspread.blender.jobs.announced import line_of, simulation_line
@@ -196,6 +197,28 @@ def test_rays_are_announced_where_obstacles_are_alone():
     assert covered == 0
     (plan,) = read_scene(bpy.context, [name_of])
     assert plan.bake(bpy.context.scene.beamspread.for_bake()).job.surroundings.shares == ({"Lamp": 0.0},)
+
+
+@pytest.mark.parametrize(("width", "share"), [(0.2, (0.9, 1.0)), (0.0, (0.0, 0.0))])
+def test_rays_to_the_sky_are_announced_in_rooms_with_a_window(width, share):
+    """Most places see it by less than one of 16 rays; a bake guides its rays there."""
+    scene = bpy.context.scene
+    scene.world = bpy.data.worlds.new("World")
+    floor = plane(size=(4.0, 4.0))
+    bpy.ops.mesh.primitive_cube_add(size=4, location=(0, 0, 1.99))
+    room = bpy.context.object.data
+    mesh = bmesh.new()
+    mesh.from_mesh(room)
+    bmesh.ops.delete(mesh, geom=[face for face in mesh.faces if face.normal.z > 0.5], context="FACES_ONLY")
+    mesh.to_mesh(room)
+    mesh.free()
+    for side in (-1, 1):
+        x = side * (1 + width / 4)
+        add_plane("Half", (2 - width / 2, 4.0), Matrix.Translation((x, 0, 3.99)))
+    (name,) = find_targets([floor])
+    stale.refresh(bpy.context)
+    least, most = share
+    assert least <= state.announced[name].around.shares[0]["*"] <= most
 
 
 def test_objects_without_shadow_block_no_light_of_lamps():

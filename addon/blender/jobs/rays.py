@@ -26,6 +26,9 @@ MAX_LAMPS = 8
 # scans.
 LIGHT_RAYS, MORE_PLACES = 16, 3
 
+# Part of the sky that is blocked where all these rays are, and other places see it.
+MOST_BLOCKED = 1 - 0.5 / LIGHT_RAYS
+
 # Length that keeps a ray off the surface from which it starts, relative to the size of the object, or to the length of
 # the ray that has met it.
 LIFT, LIFT_OF_HIT = 1e-3, 1e-4
@@ -105,6 +108,9 @@ class Tracer:
                 found[name] = 0.0
             elif len(places):
                 parts = [self._blocked(lamp, *at, number) for number, at in enumerate(zip(places, normals))]
+                if lamp is None and min(parts) < 1:  # of which something is above each place
+                    # In a room these rays miss windows that those of a bake find.
+                    parts = [min(part, MOST_BLOCKED) for part in parts]
                 found[name] = float(np.mean([share_of_rays(part) for part in parts]))
         return found
 
