@@ -74,7 +74,7 @@ def finite_remedy(name: str) -> str:
     """Advice about an object with vertices at no finite position."""
     return (
         "Check its scale and modifiers, or move the vertices (Edit Mode). "
-        f"bpy.data.objects['{name}'].data.validate() in the Python Console moves those that are no numbers."
+        f"bpy.data.objects['{name}'].data.validate() in the Python Console moves those of a mesh that are no numbers."
     )
 
 
