@@ -51,7 +51,7 @@ def test_a_sun_arrives_with_its_cosine_colour_and_direction():
 
 
 def test_means_take_the_falloff_at_the_centers_of_texels():
-    """Those of coarse texels are the centers of texels nine times as fine, which the light is far from."""
+    """The truth is the middle one of the 9 x 9 fine texels in a coarse texel: the light is far from these."""
     area = AreaLight("Area", 10.0, (1.0, 1.0, 1.0), True, (0.06, 0.06, 0.1), np.eye(3), 0.05, 0.05, False, math.pi)
 
     def irradiance(grid, **options):

@@ -194,7 +194,7 @@ def test_an_error_is_handed_over(thread):
 
 
 def test_an_error_of_an_exact_rendering_is_handed_over(thread, tmp_path):
-    """As of samples whose folder goes while the target rests."""
+    """The folder of the LDF samples disappears while the target rests."""
     target = live_target(LAMP)
     target = replace(
         target, settings=replace(target.settings, distributions="angular", sample_folder=str(tmp_path / "gone"))

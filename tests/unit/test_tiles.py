@@ -88,7 +88,7 @@ def test_islands_outside_of_the_tiles_are_left_out():
     ("tiles", "faces", "part"), [(1, 10, "90%"), (1, 20, "over 95%"), (2, 20, "90%"), (2, 30, "over 93%")]
 )
 def test_many_faces_on_each_other_are_known_by_their_areas(tiles, faces, part):
-    """As those of a map that was reset: each shows the whole image."""
+    """Each face shows the whole image, as after UV > Reset."""
     polygons = in_tiles(quads([(number % tiles, 0) for number in range(faces)]), "Wall")
     with pytest.raises(ReceiverError, match=f"overlaps: {part}"):
         check_map(polygons)

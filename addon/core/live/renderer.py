@@ -215,7 +215,7 @@ class LiveRenderer:
         return material, sources
 
     def _medium(self, target: LiveTarget) -> tuple:
-        """What the target's kernels depend on."""
+        """Material and distributions, which the kernels of the target follow."""
         material, sources = self._material(target)
         return material, *sources
 

@@ -150,7 +150,7 @@ def _faults(polygons: Polygons, name: str) -> list[Message]:
     # Neighbors run along their common edge in opposite directions, unless a normal tells that a face is mirrored.
     looks = np.sign(np.einsum("ij,ij->i", _by_order(polygons), polygons.area_vectors))[polygons.face_of]
     is_same_way = polygons.points[first] == polygons.points[second]
-    # Where more than two faces meet, as where bodies touch or lie on each other, some of them look to other sides.
+    # More than two faces meet where bodies touch or lie on each other, and look to any side there.
     meetings = np.bincount(np.concatenate([first, second]), minlength=len(looks))
     is_told = (meetings[first] == 1) & (meetings[second] == 1) & (looks[first] * looks[second] != 0)  # by an area
     is_wrong = (is_same_way == (looks[first] == looks[second])) & is_told

@@ -7,7 +7,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-# Half the angle of the largest spot, radians: half of native `SunLight.max_parallel_angle`, so that it has one kernel.
+# Radius of the largest spot, radians. Larger suns than native `SunLight.max_parallel_angle`, twice this, have more than
+# one kernel.
 REACH = math.radians(1.0)
 
 # Steps from the brightest texel to the middle of a spot. More: larger spots are found whole.
