@@ -28,15 +28,39 @@ PATIENCE_SECONDS = 60
 HANG_SECONDS = 6 * PATIENCE_SECONDS
 """By the clock: a Blender that no longer calls timers says where it stands, and ends."""
 
+LOCKED = "Writing to ID classes in this context is not allowed"
+"""Error of a Blender that no longer lets timers write.
+
+Blender has one flag for all threads, which forbids panels to write while they are drawn. A call of an engine in the
+thread of F12 saves the flag and restores it; if it starts while a panel is drawn, the flag stays set.
+"""
+
 
 def results_of(scenario: str, folder: Path, *, size: tuple[int, int] = (1600, 1000)) -> dict:
-    """Results of a scenario that a new Blender with a window and an empty cache plays."""
+    """Results of a scenario that a new Blender with a window and an empty cache plays, again if Blender locks itself.
+
+    A write that Blender never allows fails again.
+    """
+    results, done = _played(scenario, folder, size)
+    if LOCKED in results.get("error", ""):
+        results, done = _played(scenario, folder / "again", size)
+    assert "error" not in results, results["error"]
+    assert results["complete"]
+    assert done.returncode == 0, done.stderr
+    said = done.stdout + done.stderr
+    assert "Traceback" not in said, said
+    return results
+
+
+def _played(scenario: str, folder: Path, size: tuple[int, int]) -> tuple[dict, subprocess.CompletedProcess]:
+    """Results of a Blender, and the process that ended."""
     import pytest  # which the new Blender lacks, as it does the folder of the next
 
     from virtual_screen import virtual_screen
 
     if not bpy.app.binary_path:
         pytest.skip("the bpy module opens no window")
+    folder.mkdir(exist_ok=True)
     path = folder / "results.json"
     options = ["--factory-startup", "--enable-event-simulate", "--window-geometry", "0", "0", *map(str, size)]
     script = ["--python-exit-code", "1", "--python", __file__, "--", scenario, str(path)]
@@ -45,13 +69,7 @@ def results_of(scenario: str, folder: Path, *, size: tuple[int, int] = (1600, 10
         environment["BEAMSPREAD_CACHE"] = str(folder / "cache")
         done = subprocess.run(command, capture_output=True, text=True, timeout=550, env=environment)
     assert path.exists(), done.stdout + done.stderr
-    results = json.loads(path.read_text())
-    assert "error" not in results, results["error"]
-    assert results["complete"]
-    assert done.returncode == 0, done.stderr
-    said = done.stdout + done.stderr
-    assert "Traceback" not in said, said
-    return results
+    return json.loads(path.read_text()), done
 
 
 def in_window(operator, *arguments, **options):
