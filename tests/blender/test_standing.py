@@ -17,6 +17,7 @@ from mathutils import Matrix
 from scenes import (
     add_blocker,
     add_material,
+    add_mesh,
     add_plane,
     add_sun,
     bake,
@@ -115,6 +116,56 @@ def test_another_output_of_the_node_before_it(plane):
     node.id_data.links.new(node.inputs["Base Color"], place.outputs["Object"])
     update()
     assert "material" in row().messages[0].text
+
+
+def said():
+    """Words of the row of the plane for what has changed."""
+    update()
+    return row().messages[0].text
+
+
+def of_two_materials(*materials):
+    """A plane whose left and right halves have a material each."""
+    vertices = [(x, y, 0) for y in (-1, 1) for x in (-1, 0, 1)]
+    uvs = [(0, 0), (0.5, 0), (0.5, 1), (0, 1), (0.5, 0), (1, 0), (1, 1), (0.5, 1)]
+    plane = add_mesh("Plane", vertices, [(0, 1, 4, 3), (1, 2, 5, 4)], None, uvs)
+    for material in materials:
+        plane.data.materials.append(material)
+    plane.data.polygons[1].material_index = 1
+    return plane
+
+
+@pytest.mark.parametrize("indirect", [True, False], ids=["bounced light", "direct light"])
+def test_a_change_of_its_material_is_no_change_of_objects_that_have_the_material(indirect):
+    bpy.context.scene.beamspread.resolution, bpy.context.scene.beamspread.use_indirect = 16, indirect
+    material, second = add_material(), add_material("Second", albedo=(0.2, 0.2, 0.2))
+    plane = of_two_materials(material, second)
+    add_plane("Other", matrix=Matrix.Translation((5, 0, 0)), material=material)
+    add_sun(20)
+    bake(plane)
+    node_of(material).albedo = (0.5, 0.5, 0.5)
+    assert said() == "Changed since its bake: material."
+    bake(plane)
+    tree = material.node_tree
+    glow, output = tree.nodes.new("ShaderNodeEmission"), tree.get_output_node("ALL")
+    add = tree.nodes.new("ShaderNodeAddShader")
+    tree.links.new(add.inputs[0], glow.outputs[0])
+    tree.links.new(add.inputs[1], node_of(material).outputs["BSDF"])
+    tree.links.new(output.inputs["Surface"], add.outputs[0])
+    if not indirect:  # bounced light takes the light of such a material from its node alone
+        assert said() == "Changed since its bake: material."
+        bake(plane)
+    plane.material_slots[0].material, plane.material_slots[1].material = second, material
+    assert row(Target("Plane", "Medium")).messages[0].text == "Changed since its bake: object."
+
+
+def test_a_change_of_another_material_of_its_object():
+    second, bpy.context.scene.beamspread.use_indirect = add_material("Second"), True
+    plane = of_two_materials(add_material(), second)
+    add_sun(20)
+    bake(plane)
+    node_of(second).albedo = (0.5, 0.5, 0.5)
+    assert said() == "Changed since its bake: object."
 
 
 def test_a_change_of_other_data_does_not(plane):

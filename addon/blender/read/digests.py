@@ -18,7 +18,7 @@ from ...core.errors import text_of
 from .. import compat
 from .nodes import Links, shows_bake
 
-SCHEME = 3
+SCHEME = 4
 """Number of the way in which digests are made; those of another one can't be compared. A change has to count it up."""
 
 LARGE = 8 << 20

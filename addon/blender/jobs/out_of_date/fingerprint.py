@@ -67,15 +67,18 @@ def fingerprints(context, targets: Iterable[Target], is_for_bake: bool = False) 
         place = None if obj is None else find_node_in_groups(material)
         if place is None:
             continue
-        texture, number = texture_tree(material, *place), objects.solids[obj.name]
-        others = {_text(other, 8): name for name, other in objects.solids.items() if name != obj.name}
+        texture, solids = texture_tree(material, *place), objects.solids(material.name_full)
+        number = solids.pop(obj.name, 0)
+        others = {_text(other, 8): name for name, other in solids.items()}
         values = {
             "object": _text(number),
-            OTHERS: " ".join([_text(objects.solids.total() - number), *_each_of(others)]),
+            OTHERS: " ".join([_text(solids.total()), *_each_of(others)]),
             "lights": _text(objects.lamps),
             "world": world,
             "textures": _digest_of({*objects.images, *texture.images} - results),
-            "material": digest(surface_values(*place, target.side), texture.text, *filter(None, [place[0].uv_map])),
+            "material": digest(
+                surface_values(*place, target.side), texture.text, place[0].uv_map, objects.look_of(material)
+            ),
             SETTINGS: settings_part(scene),
             QUALITY: _quality(scene),
             IMAGE: image_part(image_of_side(place[0], target.side)),

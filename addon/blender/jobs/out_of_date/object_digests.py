@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from collections import Counter
+from collections import Counter, defaultdict
 from collections.abc import Iterable
 from dataclasses import replace
+from typing import NamedTuple
 
 import bpy
 import numpy as np
@@ -34,6 +35,18 @@ _MODIFIER_LOOKS = {
 }
 
 
+class _Instance(NamedTuple):
+    """One instance of an object: hash of its shape and place; full name and digest of the material of each slot."""
+
+    number: int
+    looks: list[tuple[str, str]]
+
+    def without(self, own: str | None) -> int:
+        """Hash of the instance. Of the material with the full name `own`, only its slot counts."""
+        looks = ["own" if name == own else text for name, text in self.looks]
+        return _number(self.number, looks if any(looks) else [])
+
+
 class ObjectDigests:
     """Hashes of the objects of a scene that render, and of instances: numbers, so that their sum has no order.
 
@@ -42,7 +55,6 @@ class ObjectDigests:
     Attributes
     ----------
     lamps : sum of the hashes of all lamps.
-    solids : sum of the hashes of all instances of each other object, by name.
     images : full names of the images that the nodes of lamps and materials show, in the order in which they are met.
     """
 
@@ -51,7 +63,8 @@ class ObjectDigests:
         scene = depsgraph.scene.original
         self._depsgraph, self._is_for_bake, self._bounces = depsgraph, is_for_bake, scene.beamspread.use_indirect
         self._visible = render_visible_names(depsgraph.view_layer)
-        self.lamps, self.solids, self.images = 0, Counter(), {}
+        self.lamps, self.images = 0, {}
+        self._instances: dict[str, list[_Instance]] = defaultdict(list)
         shown = [*placed(depsgraph, (obj for obj in scene.objects if obj.name in self._visible))]
         self._names = {obj.name for obj, *_ in shown if obj.type in SOLID_TYPES}
         for obj, matrix, instancer in shown:
@@ -60,6 +73,23 @@ class ObjectDigests:
         scatterers = [(instancer or obj).original for obj, _, instancer in shown if _scatters(obj)]
         if scatterers:
             self._add_scattered([*dict.fromkeys(scatterers)])
+        self._sums, self._users = Counter(), defaultdict(set)
+        for name, instances in self._instances.items():
+            self._sums[name] = sum(instance.without(None) for instance in instances)
+            for instance in instances:
+                for material_name, _ in instance.looks:
+                    self._users[material_name].add(name)
+
+    def solids(self, own: str) -> Counter[str]:
+        """Sum of the hashes of all instances of each object but lamps, by name; `own` as for `_Instance.without`."""
+        solids = Counter(self._sums)
+        for name in self._users[own]:
+            solids[name] = sum(instance.without(own) for instance in self._instances[name])
+        return solids
+
+    def look_of(self, material) -> str:
+        """Digest of the light that a material lets through and emits; of all of the material if light bounces."""
+        return self._whole(material) if self._bounces else self._light_of(material)
 
     def _add(self, obj, matrix: Matrix, instancer) -> None:
         """Add an evaluated object; `instancer` has an instance of it, or is None."""
@@ -68,9 +98,10 @@ class ObjectDigests:
             self.lamps += self._lamp(obj, matrix)
         elif obj.type in (SOLID_TYPES if self._bounces else SURFACE_TYPES):
             casts = all(owner.visible_shadow for owner in (obj, instancer) if owner is not None)
-            materials = self._materials(slot.material for slot in obj.material_slots)
-            links = self._links(obj) if is_lit and materials else []
-            self.solids[obj.name] += _number(self._shape(obj), _rows(matrix), casts, materials, links)
+            looks = self._looks(slot.material for slot in obj.material_slots)
+            links = self._links(obj) if is_lit and any(text for _, text in looks) else []
+            number = _number(self._shape(obj), _rows(matrix), casts, links)
+            self._instances[obj.name].append(_Instance(number, looks))
 
     def _lamp(self, obj, matrix: Matrix) -> int:
         light, reason = read_lamp(obj, matrix)
@@ -99,10 +130,8 @@ class ObjectDigests:
 
         return scene_cache.get(("shape", block, self._is_for_bake and not obj.is_evaluated), [block], read)
 
-    def _materials(self, materials: Iterable) -> list[str]:
-        """Digests of the light that materials let through and emit, of all of them if light bounces; [] for none."""
-        texts = [self._whole(material) if self._bounces else self._light_of(material) for material in materials]
-        return texts if any(texts) else []
+    def _looks(self, materials: Iterable) -> list[tuple[str, str]]:
+        return [("" if material is None else material.name_full, self.look_of(material)) for material in materials]
 
     def _light_of(self, material) -> str:
         """Digest of the light that a material emits and lets through; "" for none."""
@@ -139,7 +168,8 @@ class ObjectDigests:
             return _scattered(self._depsgraph, scatterers, self._visible)
 
         for name, (number, names) in scene_cache.get(("scattered",), [], read, state=state).items():
-            self.solids[name] += _number(number, self._materials(map(bpy.data.materials.get, names)))
+            looks = self._looks(map(bpy.data.materials.get, names))
+            self._instances[name].append(_Instance(number, looks))
 
 
 def texture_tree(material, node, groups: tuple) -> TreeDigest:
