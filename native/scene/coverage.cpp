@@ -21,9 +21,18 @@ constexpr std::size_t rows_per_band = 64;
 // coverage is off by less than one unit for each edge through it.
 constexpr double per_texel = 0x1p30;
 
+// Length of a piece of an edge along its row, in texels, below which the area beside it is less than a unit.
+constexpr double shortest_piece = 1e-12;
+
+// Nearest whole number of a value that is not negative. llrint would be a call of the C library at every texel.
+std::int64_t nearest(double value)
+{
+    return static_cast<std::int64_t>(value + 0.5);
+}
+
 std::int64_t counted(double part)
 {
-    return std::llrint(part * per_texel);
+    return nearest(part * per_texel);
 }
 
 // Signed area by Green's theorem: each edge adds, to every texel right of it, the height by which it crosses the texel's
@@ -55,11 +64,14 @@ public:
             return;
         const double slope = (to.x - from.x) / (to.y - from.y);
         const auto x_at = [&](double y) { return from.x + (y - from.y) * slope; };
-        for (double y = begin; y < end;) {
-            const double row = std::floor(y);
-            const double next = std::min(row + 1.0, end);
-            add_in_row(static_cast<std::size_t>(row), x_at(y), x_at(next), sign * (counted(next) - counted(y)));
+        double x = x_at(begin);
+        auto row = static_cast<std::size_t>(begin);
+        for (double y = begin; y < end; ++row) {
+            const double next = std::min(static_cast<double>(row) + 1.0, end);
+            const double next_x = x_at(next);
+            add_in_row(row, x, next_x, counted(next) - counted(y), sign);
             y = next;
+            x = next_x;
         }
     }
 
@@ -74,44 +86,48 @@ public:
     }
 
 private:
-    // Adds a piece of an edge within one row, which rises by `height` from x0 to x1, texel by texel.
-    void add_in_row(std::size_t row, double x0, double x1, std::int64_t height)
+    // Adds a piece of an edge within one row, which rises by `height` from x0 to x1. It covers a texel by its mean height
+    // there, which is that at the texel's centre where it passes through the whole texel.
+    void add_in_row(std::size_t row, double x0, double x1, std::int64_t height, int sign)
     {
         if (x0 > x1)
             std::swap(x0, x1);  // the piece counts the same either way
-        std::int64_t* difference = &m_difference[row * m_stride];
-        // Height of the edge at x.
-        const auto height_at = [&](double x) {
-            return x < x1 ? std::llrint(static_cast<double>(height) * ((x - x0) / (x1 - x0))) : height;
-        };
-
-        // Left of the grid, the whole row lies right of the edge; right of the grid, none of it.
-        std::int64_t risen = 0;
-        if (x0 < 0.0) {
-            risen = height_at(0.0);
-            difference[0] += risen;
-        }
-        if (x0 >= m_width || x1 < 0.0)
+        if (x0 >= m_width)
             return;
-        const double end = std::min(x1, m_width);
-        double x = std::max(x0, 0.0);
-        do {
-            const double next = std::min(std::floor(x) + 1.0, end);
-            const std::int64_t next_height = height_at(next);
-            add_in_texel(difference, x, next, next_height - risen);
-            risen = next_height;
-            x = next;
-        } while (x < end);
-    }
+        std::int64_t* difference = &m_difference[row * m_stride];
+        if (x1 < 0.0) {
+            difference[0] += sign * height;
+            return;
+        }
 
-    // Covers the part of the texel right of the edge, and all further texels wholly.
-    static void add_in_texel(std::int64_t* difference, double x0, double x1, std::int64_t height)
-    {
-        const double left = std::floor(x0);
-        const auto part_left = std::llrint(static_cast<double>(height) * (0.5 * (x0 + x1) - left));
-        const auto texel = static_cast<std::size_t>(left);
-        difference[texel] += height - part_left;
-        difference[texel + 1] += part_left;
+        const auto rise = static_cast<double>(height);
+        auto texel = static_cast<std::int64_t>(std::max(x0, 0.0));
+        const auto last = static_cast<std::int64_t>(std::min(x1, m_width));
+        if (texel == last && x0 >= 0.0) {
+            const std::int64_t mean = nearest(rise * (1.0 - (0.5 * (x0 + x1) - static_cast<double>(last))));
+            difference[last] += sign * mean;
+            difference[last + 1] += sign * (height - mean);
+            return;
+        }
+
+        // Rise per texel. The limit keeps the quotient finite; a shorter piece leaves less than one unit beside it.
+        const double slope = rise / std::max(x1 - x0, shortest_piece);
+        std::int64_t covered = 0;
+        const auto cover = [&](std::int64_t mean) {
+            difference[texel++] += sign * (mean - covered);
+            covered = mean;
+        };
+        if (x0 >= 0.0) {
+            const double part = static_cast<double>(texel + 1) - x0;
+            cover(nearest(0.5 * part * part * slope));
+        }
+        while (texel < last)
+            cover(nearest((static_cast<double>(texel) + 0.5 - x0) * slope));
+        if (x1 < m_width) {
+            const double part = x1 - static_cast<double>(last);
+            cover(height - nearest(0.5 * part * part * slope));
+            cover(height);
+        }
     }
 
     double m_bottom;

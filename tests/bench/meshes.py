@@ -58,8 +58,15 @@ def disk(corners):
     return Polygons(points, 0.5 + 0.5 * circle, np.array([0, corners]), np.array([[0, 0, 1.0]]))
 
 
-def charts(polygons):
-    return build_receiver(flatten(polygons), RESOLUTION, RESOLUTION)
+def star(corners):
+    """One face with edges across the whole image."""
+    angles, radii = 2 * np.pi * np.arange(corners) / corners, np.where(np.arange(corners) % 2, 0.02, 0.49)
+    uvs = 0.5 + radii[:, None] * np.stack([np.cos(angles), np.sin(angles)], -1)
+    return Polygons(np.column_stack([uvs, np.zeros(corners)]), uvs, np.array([0, corners]), np.array([[0, 0, 1.0]]))
+
+
+def charts(polygons, side=RESOLUTION):
+    return build_receiver(flatten(polygons), side, side)
 
 
 CHILD = """
@@ -106,6 +113,8 @@ def main():
     print(f"an outline of {corners} corners")
     measured("flatten and build_receiver", lambda: charts(disk(corners)))
     measured("unwrap", lambda: unwrap(disk(corners)))
+    print(f"a star of {corners} edges across an image of 4096 x 4096")
+    measured("flatten and build_receiver", lambda: charts(star(corners), 4096))
     memory(side)
 
 
