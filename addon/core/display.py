@@ -1,4 +1,4 @@
-"""Files that hold no values above 1: exposure that brings values there, sRGB encoding, and PNG.
+"""Files of 8 and 16 bits: PNG, with sRGB encoding and an exposure that brings values to 1 or below, and Radiance HDR.
 
 An *exposure* is the factor that texels of a file were multiplied by; the radiance is the decoded value divided by it.
 """
@@ -17,6 +17,8 @@ EXPOSURE = "beamspread:exposure"
 AUTO = "auto"
 """Exposure by the largest value."""
 
+_SMALLEST_HDR, _LARGEST_HDR = 1e-32, 1e38
+"""Values that Radiance files hold at least and at most; smaller ones are 0 there."""
 
 R2_STEPS = 0.7548776662466927, 0.5698402909980532
 """Inverse of the root of x^3 = x + 1, and its square."""
@@ -67,6 +69,41 @@ def png(texture: np.ndarray, bits: int = 8, exposure: float = 1.0) -> bytes:
         (b"IEND", b""),
     ]
     return b"\x89PNG\r\n\x1a\n" + b"".join(_chunk(kind, content) for kind, content in chunks)
+
+
+def hdr(texture: np.ndarray, exposure: float = 1.0) -> bytes:
+    """Content of a Radiance file: linear RGB (height, width, 3), row 0 at the bottom, times the exposure.
+
+    A texel has 8 bits for each channel and one exponent for all (G. Ward, "Real Pixels", Graphics Gems II, 1991). Bits
+    are rounded up or down in the proportion of the values, so that means stay where readers take a number n of the
+    exponent e as n 2^(e - 136): engines do. Ward's own readers and Blender take it as (n + .5) 2^(e - 136).
+    """
+    height, width = texture.shape[:2]
+    values = np.clip(np.nan_to_num(texture[::-1] * np.float32(exposure)), 0, _LARGEST_HDR).astype(np.float64)
+    thresholds, largest = _spread_thresholds(width, height), values.max(axis=2)
+    exponents = np.frexp(largest)[1]
+    # One more where the largest channel would be rounded to 256.
+    exponents += (np.ldexp(values, 8 - exponents[..., None]) + thresholds).max(axis=2) >= 256
+    texels = np.zeros((height, width, 4), np.uint8)
+    is_lit = largest > _SMALLEST_HDR
+    texels[..., :3] = np.floor(np.ldexp(values, 8 - exponents[..., None]) + thresholds) * is_lit[..., None]
+    texels[..., 3] = (exponents + 128) * is_lit
+    lines = ["#?RADIANCE", "FORMAT=32-bit_rle_rgbe", *([f"EXPOSURE={exposure!r}"] if exposure != 1 else []), ""]
+    return "\n".join([*lines, f"-Y {height} +X {width}", ""]).encode("ascii") + _scanlines(texels)
+
+
+def _scanlines(texels: np.ndarray) -> bytes:
+    """Texels (height, width, 4) in the form that readers expect for their width; no runs are looked for."""
+    height, width = texels.shape[:2]
+    if not 8 <= width < 2**15:
+        return texels.tobytes()
+    channels = np.moveaxis(texels, 2, 1)  # of each line one after the other, in blocks of up to 128 after their length
+    starts = np.arange(0, width, 128)
+    lengths = np.minimum(width - starts, 128).astype(np.uint8)
+    counts = np.broadcast_to(lengths, (height, 4, len(starts)))
+    lines = np.insert(channels, starts, counts, axis=2).reshape(height, -1)
+    start = np.tile(np.array([2, 2, width >> 8, width & 255], np.uint8), (height, 1))
+    return np.hstack([start, lines]).tobytes()
 
 
 def _spread_thresholds(width: int, height: int) -> np.ndarray:

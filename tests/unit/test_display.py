@@ -1,11 +1,13 @@
-"""Exposure and PNG files, read by Pillow."""
+"""Exposure, PNG files, read by Pillow, and Radiance files."""
 
 import io
 
 import numpy as np
 import pytest
-from beamspread.core.display import auto_exposure, png, png_exposure, to_srgb
+from beamspread.core.display import auto_exposure, hdr, png, png_exposure, to_srgb
 from PIL import Image
+
+from plain_hdr import decoded_hdr
 
 
 def test_exposure_is_the_largest_power_of_two_that_fits():
@@ -66,3 +68,34 @@ def test_the_exposure_is_in_the_file():
     assert png_exposure(png(texture)) == 1
     with pytest.raises(ValueError, match="bits = 12"):
         png(texture, 12)
+
+
+@pytest.mark.parametrize("width", [1, 7, 8, 127, 128, 129, 300])
+def test_radiance_files_hold_each_value_to_a_digit_of_the_largest_channel(width):
+    texture = np.random.default_rng(3).random((5, width, 3), np.float32) * np.float32([40, 1, 0.01])
+    texture[2, 0] = 0
+    found, header = decoded_hdr(hdr(texture, 0.5))
+    assert header == [b"#?RADIANCE", b"FORMAT=32-bit_rle_rgbe", b"EXPOSURE=0.5"]
+    digit = 2.0 ** np.frexp(0.5 * texture.max(axis=2))[1] / 256
+    # Two digits where the largest channel rounds up to a power of two.
+    assert np.all(np.abs(found - 0.5 * texture) < 2 * digit[..., None] + 1e-30)
+    assert np.mean(np.abs(found - 0.5 * texture) < digit[..., None] + 1e-30) > 0.99
+    assert (found[2, 0] == 0).all()
+
+
+@pytest.mark.parametrize("weak", [0.2, 0.02, 0.004])
+def test_radiance_files_keep_the_mean_of_channels_far_below_the_largest(weak):
+    """Cut off to whole digits, they would be 1, 9 and 48 % too dark."""
+    texture = (0.5 + np.random.default_rng(4).random((128, 96, 1))) * np.float32([3.9, 3.9 * weak, 3.9])
+    found, _ = decoded_hdr(hdr(texture.astype(np.float32)))
+    assert found.mean(axis=(0, 1)) == pytest.approx(texture.mean(axis=(0, 1)), rel=0.004)
+
+
+def test_radiance_files_hold_no_negative_and_no_infinite_values():
+    texture = np.float32([[[-1, 2, 0.5], [np.inf, 1, 1], [np.nan, 1, 1e-35], [255.999, 1, 1]]])
+    found, _ = decoded_hdr(hdr(texture))
+    assert found[0, 0] == pytest.approx([0, 2, 0.5])
+    assert found[0, 1, 0] == pytest.approx(1e38, rel=0.01)
+    assert found[0, 2] == pytest.approx([0, 1, 0])
+    assert found[0, 3, 0] == pytest.approx(256, abs=1)
+    assert not decoded_hdr(hdr(np.full((2, 9, 3), 1e-36, np.float32)))[0].any()

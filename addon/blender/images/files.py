@@ -11,7 +11,7 @@ import bpy
 import numpy as np
 
 from ...core.disk import is_half, text_of, whole_files
-from ...core.display import EXPOSURE, png, to_srgb
+from ...core.display import EXPOSURE, hdr, png, to_srgb
 from ...core.errors import ImageError
 from ...core.native import native
 from .. import compat
@@ -242,20 +242,13 @@ def write_png(path: Path, texture: np.ndarray, view_of=None, bits: int = 8, expo
 
 
 def write_hdr(path: Path, texture: np.ndarray, exposure: float = 1.0) -> None:
-    """Write a Radiance file; its header has the exposure, which readers may take as the format defines it."""
-    image = make_image("Beamspread HDR", *texture.shape[1::-1], is_data=True)  # else Blender writes sRGB
-    try:
-        set_pixels(image, texture * np.float32(exposure))
-        image.file_format = "HDR"
-        with _whole_image(path) as temporary:
-            image.filepath_raw = str(temporary)
-            image.save()
-            if exposure != 1:
-                first, _, rest = temporary.read_bytes().partition(b"\n")
-                temporary.write_bytes(first + f"\nEXPOSURE={exposure!r}\n".encode() + rest)
-            _check_written(temporary, texture.shape[1::-1])
-    finally:
-        bpy.data.images.remove(image)
+    """Write a Radiance file for engines; its header has the exposure, which readers may take as the format defines it.
+
+    Files for Blender itself are written by Blender, which reads numbers half a digit higher than engines.
+    """
+    with _whole_image(path) as temporary:
+        temporary.write_bytes(hdr(texture, exposure))
+        _check_written(temporary, texture.shape[1::-1])
 
 
 def save_image(image, path: Path) -> None:
