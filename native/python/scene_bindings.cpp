@@ -79,19 +79,22 @@ std::unique_ptr<ReceiverGrid> make_bent_grid(const py::array& positions, const p
 }
 
 Array<float> coverage(const py::array& corners, const py::array& corner_counts, py::ssize_t width, py::ssize_t height,
-                      int threads)
+                      int threads, py::ssize_t row_step, bool is_cut)
 {
     const auto points = to_rows<Vec2, double>("corners", corners, "contiguous float64 (N, 2)");
     if (!py::isinstance<Array<std::uint32_t>>(corner_counts) || corner_counts.ndim() != 1)
         reject("corner_counts", shape_text(corner_counts), "contiguous uint32 (P,)");
     if (width < 1 || height < 1)
         reject(width < 1 ? "width" : "height", static_cast<double>(std::min(width, height)), "1 or more texels");
+    if (row_step < 1)
+        reject("row_step", static_cast<double>(row_step), "1 or more texels");
+    const CoverageOptions options{.row_step = static_cast<std::size_t>(row_step), .is_cut = is_cut, .threads = threads};
     const std::span counts(static_cast<const std::uint32_t*>(corner_counts.data()), side(corner_counts, 0));
     Array<float> covered({height, width});
     const View2D<float> texels{covered.mutable_data(), side(covered, 0), side(covered, 1), width};
     {
         const py::gil_scoped_release released;
-        compute_coverage(points, counts, threads, texels);
+        compute_coverage(points, counts, options, texels);
     }
     return covered;
 }
@@ -341,7 +344,8 @@ ValueError
 
     bind_lights(m);
     m.def("coverage", &coverage, py::arg("corners"), py::arg("corner_counts"), py::arg("width"), py::arg("height"),
-          py::arg("threads") = 0, R"(The exact part of each texel of a grid that polygons cover.
+          py::arg("threads") = 0, py::arg("row_step") = 1, py::arg("is_cut") = true,
+          R"(The exact part of each texel of a grid that polygons cover.
 
 Parameters
 ----------
@@ -354,11 +358,16 @@ width, height : int
     Size of the grid, texels.
 threads : int
     0: all.
+row_step : int
+    With 2 and more, row i of the grid is one of the texel rows from i * row_step up to the next multiple: a probe of
+    a grid with row_step as many rows, in as small a part of the time.
+is_cut : bool
+    True if the sum of overlapping polygons is cut at 1.
 
 Returns
 -------
 coverage : ndarray, float32, shape (height, width)
-    0 to 1; where polygons overlap the sum is cut at 1.
+    0 to 1; more where polygons overlap and `is_cut` is false.
 
 Raises
 ------

@@ -21,6 +21,9 @@ constexpr std::size_t rows_per_band = 64;
 // coverage is off by less than one unit for each edge through it.
 constexpr double per_texel = 0x1p30;
 
+// Texel rows that lie row_step apart are shifted by the parts of its multiples: evenly, and in step with no pattern of a map.
+constexpr double golden_ratio = 0.6180339887498949;
+
 // Length of a piece of an edge along its row, in texels, below which the area beside it is less than a unit.
 constexpr double shortest_piece = 1e-12;
 
@@ -40,14 +43,22 @@ std::int64_t counted(double part)
 // running sum at the end gives the covered part.
 class Band {
 public:
-    Band(std::size_t first_row, std::size_t rows, std::size_t width)
-        : m_bottom(static_cast<double>(first_row)),
-          m_rows(static_cast<double>(rows)),
+    Band(std::size_t first_row, std::size_t rows, std::size_t width, std::size_t row_step)
+        : m_bottom(static_cast<double>(first_row * row_step)),
+          m_step(static_cast<double>(row_step)),
           m_width(static_cast<double>(width)),
           m_stride(width + 1),
+          m_row_bottoms(rows),
           m_difference(rows * m_stride, 0)
     {
+        for (std::size_t row = 0; row < rows; ++row) {
+            const double part = static_cast<double>(first_row + row) * golden_ratio;
+            m_row_bottoms[row] = static_cast<double>(row) * m_step + std::floor((part - std::floor(part)) * m_step);
+        }
     }
+
+    double bottom() const { return m_bottom; }
+    double top() const { return m_bottom + static_cast<double>(m_row_bottoms.size()) * m_step; }
 
     // Adds an edge, in texels of the grid.
     void add_edge(Vec2 from, Vec2 to, int sign)
@@ -59,29 +70,29 @@ public:
             sign = -sign;
         }
         const double begin = std::max(from.y, 0.0);
-        const double end = std::min(to.y, m_rows);
+        const double end = std::min(to.y, top() - m_bottom);
         if (!(begin < end))
             return;
         const double slope = (to.x - from.x) / (to.y - from.y);
         const auto x_at = [&](double y) { return from.x + (y - from.y) * slope; };
-        double x = x_at(begin);
-        auto row = static_cast<std::size_t>(begin);
-        for (double y = begin; y < end; ++row) {
-            const double next = std::min(static_cast<double>(row) + 1.0, end);
-            const double next_x = x_at(next);
-            add_in_row(row, x, next_x, counted(next) - counted(y), sign);
-            y = next;
-            x = next_x;
+        for (auto row = static_cast<std::size_t>(begin / m_step); row < m_row_bottoms.size(); ++row) {
+            const double y0 = std::max(begin, m_row_bottoms[row]);
+            const double y1 = std::min(end, m_row_bottoms[row] + 1.0);
+            if (y0 < y1)
+                add_in_row(row, x_at(y0), x_at(y1), counted(y1) - counted(y0), sign);
+            else if (y0 >= end)
+                return;
         }
     }
 
-    void sum_row(std::size_t row, float* coverage) const
+    void sum_row(std::size_t row, float* coverage, bool is_cut) const
     {
         const std::int64_t* difference = &m_difference[row * m_stride];
         std::int64_t covered = 0;
         for (std::size_t x = 0; x + 1 < m_stride; ++x) {
             covered += difference[x];
-            coverage[x] = static_cast<float>(std::clamp(static_cast<double>(covered) / per_texel, 0.0, 1.0));
+            const double part = static_cast<double>(covered) / per_texel;
+            coverage[x] = static_cast<float>(is_cut ? std::clamp(part, 0.0, 1.0) : part);
         }
     }
 
@@ -131,9 +142,10 @@ private:
     }
 
     double m_bottom;
-    double m_rows;
+    double m_step;
     double m_width;
     std::size_t m_stride;
+    std::vector<double> m_row_bottoms;  // in texels above m_bottom
     std::vector<std::int64_t> m_difference;
 };
 
@@ -182,25 +194,27 @@ std::vector<Polygon> split(std::span<const Vec2> corners, std::span<const std::u
 
 }  // namespace
 
-void compute_coverage(std::span<const Vec2> corners, std::span<const std::uint32_t> corner_counts, int threads,
-                      const View2D<float>& coverage)
+void compute_coverage(std::span<const Vec2> corners, std::span<const std::uint32_t> corner_counts,
+                      const CoverageOptions& options, const View2D<float>& coverage)
 {
+    if (options.row_step < 1)
+        reject("row_step", std::to_string(options.row_step), "1 or more texels");
     const std::vector<Polygon> polygons = split(corners, corner_counts);
     const std::size_t bands = (coverage.height + rows_per_band - 1) / rows_per_band;
     const auto fill_band = [&](std::size_t index) {
         const std::size_t first = index * rows_per_band;
         const std::size_t rows = std::min(rows_per_band, coverage.height - first);
-        Band band(first, rows, coverage.width);
+        Band band(first, rows, coverage.width, options.row_step);
         for (const Polygon& polygon : polygons) {
-            if (polygon.top <= static_cast<double>(first) || polygon.bottom >= static_cast<double>(first + rows))
+            if (polygon.top <= band.bottom() || polygon.bottom >= band.top())
                 continue;
             for (std::size_t i = 0; i < polygon.corners.size(); ++i)
                 band.add_edge(polygon.corners[i], polygon.corners[(i + 1) % polygon.corners.size()], polygon.sign);
         }
         for (std::size_t row = 0; row < rows; ++row)
-            band.sum_row(row, coverage.row(first + row));
+            band.sum_row(row, coverage.row(first + row), options.is_cut);
     };
-    with_threads(threads, [&] { parallel_for(bands, fill_band); });
+    with_threads(options.threads, [&] { parallel_for(bands, fill_band); });
 }
 
 }  // namespace beamspread

@@ -65,6 +65,16 @@ def star(corners):
     return Polygons(np.column_stack([uvs, np.zeros(corners)]), uvs, np.array([0, corners]), np.array([[0, 0, 1.0]]))
 
 
+def slivers(count):
+    """Triangles from side to side of the image, beside each other."""
+    places = np.arange(count) / count
+    triangle = (0, 0), (1 / count, 0), (0, 1)
+    uvs = np.stack([np.stack([places + part, 0 * places + row], -1) for part, row in triangle], 1)
+    corners = uvs.reshape(-1, 2)
+    normals = np.zeros((count, 3))
+    return Polygons(np.pad(corners, ((0, 0), (0, 1))), corners, np.arange(0, 3 * count + 1, 3), normals)
+
+
 def charts(polygons, side=RESOLUTION):
     return build_receiver(flatten(polygons), side, side)
 
@@ -115,6 +125,8 @@ def main():
     measured("unwrap", lambda: unwrap(disk(corners)))
     print(f"a star of {corners} edges across an image of 4096 x 4096")
     measured("flatten and build_receiver", lambda: charts(star(corners), 4096))
+    print(f"{side**2} slivers across the image")
+    measured("check_map", lambda: check_map(slivers(side**2)))
     memory(side)
 
 

@@ -8,7 +8,7 @@ from beamspread.core.errors import ReceiverError
 from beamspread.core.scene import islands
 from beamspread.core.scene.flat_mesh import flatten
 from beamspread.core.scene.planes import find_planes
-from beamspread.core.scene.polygons import components
+from beamspread.core.scene.polygons import Polygons, components
 from beamspread.core.scene.receiver import build_receiver
 
 from mesh_shapes import SQUARE, box, heights, mesh_of
@@ -154,6 +154,26 @@ def test_a_trapezoid_on_a_square_is_cut_into_triangles():
 def test_overlapping_islands_are_refused():
     with pytest.raises(ReceiverError, match="overlaps: 100%"):
         build_receiver(flatten(mesh_of(box(), [SQUARE] * 6)), 32, 32)
+
+
+@pytest.mark.parametrize("axis", [0, 1])
+@pytest.mark.parametrize("twice", [False, True])
+def test_slivers_across_the_whole_image_are_probed_in_some_rows(axis, twice):
+    """A million edges from side to side pass through 2e9 texels; half of the image stays empty."""
+    places = np.linspace(0, 0.5, 500_001)[: 250_000 if twice else None]
+    left, right, tips = places[:-1], places[1:], 0.5 * (places[:-1] + places[1:])
+    uvs = np.zeros((len(left), 3, 2))
+    uvs[..., axis] = np.stack([left, right, tips], axis=1)
+    uvs[:, 2, 1 - axis] = 1
+    uvs = np.concatenate([uvs, uvs]) if twice else uvs
+    corners = uvs.reshape(-1, 2)
+    normals = np.tile((0.0, 0.0, 1.0), (len(uvs), 1))
+    slivers = Polygons(np.pad(corners, ((0, 0), (0, 1))), corners, np.arange(0, len(corners) + 1, 3), normals)
+    if not twice:
+        islands.check_map(slivers)
+        return
+    with pytest.raises(ReceiverError, match=r"overlaps: 2[4-6]%"):  # a half, less where they cover half of a texel
+        islands.check_map(slivers)
 
 
 def test_faces_without_area_are_named_with_a_remedy_that_works():

@@ -146,6 +146,21 @@ def test_overlap_is_cut_at_one():
     np.testing.assert_array_equal(coverage([square, square], 2, 2), np.ones((2, 2), np.float32))
 
 
+def test_overlap_can_be_counted():
+    square, half = [(0, 0), (2, 0), (2, 2), (0, 2)], [(0, 0), (2, 0), (2, 1), (0, 1)]
+    np.testing.assert_array_equal(coverage([square, half, half], 2, 2, is_cut=False), [(3, 3), (1, 1)])
+
+
+@pytest.mark.parametrize("step", [2, 7, 100])
+def test_a_probe_has_one_texel_row_of_each_step(step):
+    polygons = [[(1, 0), (59, 700), (60, 700), (60, 0)]]  # no two rows are alike
+    full, probed = coverage(polygons, 60, 700), coverage(polygons, 60, 700 // step, row_step=step)
+    rows = [int(np.abs(full[i * step : (i + 1) * step] - row).sum(axis=1).argmin()) for i, row in enumerate(probed)]
+    for i, (row, offset) in enumerate(zip(probed, rows)):
+        np.testing.assert_allclose(row, full[i * step + offset], atol=1e-6)
+    assert len(set(rows)) == min(step, len(rows))  # no regular pattern of a map lies between all of them
+
+
 @pytest.mark.parametrize(
     ("corners", "counts", "size", "message"),
     [
@@ -163,3 +178,8 @@ def test_overlap_is_cut_at_one():
 def test_bad_arguments_are_named(corners, counts, size, message):
     with pytest.raises(ValueError, match=message):
         native.coverage(corners, counts, *size)
+
+
+def test_a_row_step_below_one_is_refused():
+    with pytest.raises(ValueError, match=r"row_step.*0.*1 or more"):
+        coverage([[(0, 0), (5, 0), (5, 4)]], 5, 4, row_step=0)
