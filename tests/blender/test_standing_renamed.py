@@ -43,6 +43,24 @@ def test_a_copy_is_not_taken_for_the_renamed_original():
     assert Status.BAKED not in standings()
 
 
+def test_an_original_that_is_renamed_and_copied_at_once_keeps_its_bake():
+    """No scan has seen the new name alone; the copy is far away, and light does not bounce."""
+    bpy.context.scene.beamspread.use_indirect = False
+    plane = make_baked()
+    plane.name = "Renamed"
+    copy = plane.copy()
+    copy.location.x = 50
+    bpy.context.collection.objects.link(copy)
+    bpy.context.view_layer.update()
+    stale.refresh(bpy.context)
+    rows = {target.object_name: row for target, row in state.rows.items()}
+    assert set(rows) == {"Renamed", copy.name}
+    assert rows["Renamed"].messages[0].text == f"Changed since its bake: '{copy.name}'."
+    assert rows[copy.name].status == Status.NEVER
+    bpy.data.objects.remove(copy)
+    assert standings() == [Status.BAKED]
+
+
 def test_a_renamed_original_names_the_copy_beside_it():
     """The copy takes light away; a further one that is removed again leaves nothing to say."""
     plane = make_baked()

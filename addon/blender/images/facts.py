@@ -9,6 +9,7 @@ from __future__ import annotations
 import json
 import os
 import re
+from collections.abc import Iterable
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import NamedTuple
@@ -21,6 +22,7 @@ from ...core.bake.runner import Bake
 from ...core.disk import text_of
 from ...core.messages import Level, Message, note, warning
 from ...core.target import FRONT, Target
+from .. import compat
 from ..node.find import BakeTarget, targets_of
 from ..read.digests import SCHEME
 from ..read.visibility import with_instanced
@@ -41,6 +43,9 @@ OLD_PREVIEW = "beamspread_preview"
 
 ATTRIBUTE = "beamspread:bake"
 """EXR attribute that holds the record of a frame of a batch."""
+
+_sessions: dict[Target, int] = {}
+"""Session number of each target's object."""
 
 
 @dataclass(frozen=True)
@@ -154,6 +159,7 @@ def note_bake(image, target: Target, record: Record | None = None) -> None:
     bakes = {user: entry for name, entry in facts.bakes.items() for user in _known_as(name, users)}
     facts.bakes = bakes | {target: record or bakes.get(target, Record())}
     set_facts(image, facts)
+    remember([target])
 
 
 def record_of(image, target: Target) -> Record | None:
@@ -240,10 +246,25 @@ def attributes_of(record: Record) -> dict[str, str]:
     return {ATTRIBUTE: json.dumps(asdict(record))}
 
 
+def remember(targets: Iterable[Target]) -> None:
+    """Remember which objects have the names of targets, so that these are known again although copies stand beside."""
+    for target in targets:
+        _sessions[target] = _session_of(target)
+
+
+def _session_of(target: Target) -> int:
+    obj = bpy.data.objects.get(target.object_name)
+    return 0 if obj is None else compat.session_id(obj)
+
+
 def _known_as(name: Target, users: list[Target]) -> list[Target]:
     """Users of the image that a recorded name stands for: itself, else those of its material, else of its object."""
     if name in users:
         return [name]
+    session = _sessions.get(name, 0)
+    for user in users if session else ():
+        if user.image_key == name.image_key and _session_of(user) == session:
+            return [user]
     same_material = [user for user in users if user.material_name == name.material_name]
     return same_material or [user for user in users if user.object_name == name.object_name]
 
@@ -284,4 +305,13 @@ def _remove_old_previews(*_arguments) -> None:
             del image[OLD_PREVIEW]
 
 
-register, unregister = all_or_nothing(*handlers(load_post=_remove_old_previews))
+@persistent
+def _forget(*_arguments) -> None:
+    """Forget the objects of targets: undo and loading replace objects."""
+    _sessions.clear()
+
+
+register, unregister = all_or_nothing(
+    *handlers(load_post=_remove_old_previews),
+    *handlers(load_post=_forget, undo_post=_forget, redo_post=_forget),
+)

@@ -27,6 +27,7 @@ from ...images.facts import (
     record_in,
     record_of,
     record_of_bake,
+    remember,
 )
 from ...images.files import file_of
 from ...images.udim import is_tiled, missing_files
@@ -69,6 +70,7 @@ def refresh(context) -> None:
     images = {target: image_of(target) for target in find_bakeable(context.view_layer, context.scene.objects)}
     records = {target: _record(target, image, context.scene) for target, image in images.items()}
     recorded = [target for target, record in records.items() if record is not None]
+    remember(recorded)
     for target in recorded:
         pace.recall(target.object_name, records[target].ratios)
     now = fingerprints(context, recorded) if recorded else {}
