@@ -156,7 +156,7 @@ def test_a_change_of_its_material_is_no_change_of_objects_that_have_the_material
         assert said() == "Changed since its bake: material."
         bake(plane)
     plane.material_slots[0].material, plane.material_slots[1].material = second, material
-    assert row(Target("Plane", "Medium")).messages[0].text == "Changed since its bake: object."
+    assert row(Target("Plane", "Medium")).messages[0].text == "Changed since its bake: other materials of the object."
 
 
 def test_a_change_of_another_material_of_its_object():
@@ -165,7 +165,7 @@ def test_a_change_of_another_material_of_its_object():
     add_sun(20)
     bake(plane)
     node_of(second).albedo = (0.5, 0.5, 0.5)
-    assert said() == "Changed since its bake: object."
+    assert said() == "Changed since its bake: other materials of the object."
 
 
 def test_a_change_of_other_data_does_not(plane):

@@ -68,10 +68,11 @@ def fingerprints(context, targets: Iterable[Target], is_for_bake: bool = False) 
         if place is None:
             continue
         texture, solids = texture_tree(material, *place), objects.solids(material.name_full)
-        number = solids.pop(obj.name, 0)
+        solids.pop(obj.name, None)
         others = {_text(other, 8): name for name, other in solids.items()}
         values = {
-            "object": _text(number),
+            "object": _text(objects.shape_of(obj.name)),
+            "other materials of the object": objects.other_materials(obj.name, material.name_full),
             OTHERS: " ".join([_text(solids.total()), *_each_of(others)]),
             "lights": _text(objects.lamps),
             "world": world,

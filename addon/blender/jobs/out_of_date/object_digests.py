@@ -43,8 +43,12 @@ class _Instance(NamedTuple):
 
     def without(self, own: str | None) -> int:
         """Hash of the instance. Of the material with the full name `own`, only its slot counts."""
+        return _number(self.number, self.looks_without(own))
+
+    def looks_without(self, own: str | None) -> list[str]:
+        """Digests of the materials; [] if none emits light or lets any through."""
         looks = ["own" if name == own else text for name, text in self.looks]
-        return _number(self.number, looks if any(looks) else [])
+        return looks if any(looks) else []
 
 
 class ObjectDigests:
@@ -86,6 +90,14 @@ class ObjectDigests:
         for name in self._users[own]:
             solids[name] = sum(instance.without(own) for instance in self._instances[name])
         return solids
+
+    def shape_of(self, name: str) -> int:
+        """Sum of the hashes of all instances of an object, without its materials."""
+        return sum(instance.number for instance in self._instances[name])
+
+    def other_materials(self, name: str, own: str) -> str:
+        """Digest of the materials of an object's slots, `own` as for `_Instance.without`."""
+        return digest([instance.looks_without(own) for instance in self._instances[name]])
 
     def look_of(self, material) -> str:
         """Digest of the light that a material lets through and emits; of all of the material if light bounces."""
