@@ -79,6 +79,21 @@ def test_objects_lie_side_by_side_in_one_image_that_a_bake_fills():
         assert (pixels[inside] > 0).all(axis=-1).mean() > 0.99
 
 
+def test_an_object_that_has_lost_its_map_is_sent_to_a_new_atlas():
+    boxes = [add_box("A", 0), add_box("B", 2.5)]
+    make_atlas(*boxes)
+    scenes.bake(*boxes)
+    layers = boxes[1].data.uv_layers
+    layers.remove(layers[OWN_MAP])
+    scenes.select(*boxes)
+    message = scenes.messages_of(bpy.ops.beamspread.bake)
+    assert "select all objects of the atlas, and make One Atlas for the Selection again" in message
+    image = make_atlas(*boxes)
+    scenes.bake(*boxes)
+    assert scenes.image_of(boxes[1]) == image
+    check_places(boxes)
+
+
 def test_each_object_is_baked_as_if_it_were_alone():
     """The texels of a box in the atlas are those of the same box with the same map in an image of its own."""
     boxes = [add_box("A", 0), add_box("B", 2.5)]

@@ -77,6 +77,16 @@ def test_remedies_in_edit_mode_ask_for_a_mesh_first():
     assert "Convert" not in line
 
 
+def test_lives_refusal_of_a_text_names_a_way_out_for_a_text():
+    add_text("Hey")
+    bpy.context.scene.beamspread.use_live = True
+    settle()
+    (line,) = [line for line in live_lines() if "UV map" in line]
+    switch_off()
+    assert "Convert it to a mesh first (Object > Convert > Mesh). Unwrap the mesh" in line
+    assert "Bake makes a map" in line
+
+
 def evaluated(obj):
     return obj.evaluated_get(bpy.context.evaluated_depsgraph_get())
 

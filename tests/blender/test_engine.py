@@ -97,6 +97,62 @@ def test_a_nodes_image_is_refused_by_another_map_than_it_is_shown_by():
     assert scenes.pixels(image)[:, :16].all()
 
 
+@pytest.mark.parametrize("fault", ["map", "vertices", "none"])
+@pytest.mark.parametrize("is_packed", [True, False])
+def test_a_nodes_image_keeps_its_bake_where_blenders_own_operator_has_no_result(fault, is_packed):
+    """In a window; here the handlers are called as it does."""
+    plane = scenes.add_plane(material=scenes.add_material())
+    scenes.add_sun(40, 30)
+    node = with_second_map(plane)
+    image = node.image = add_active_image(plane.data.materials[0])
+    before = scenes.bake(plane)[0]
+    if not is_packed:
+        image.pixels[0] = image.pixels[0]  # as after painting: its file has other pixels
+        assert image.is_dirty
+    if fault != "map":
+        plane.data.uv_layers.active = plane.data.uv_layers["Second"]
+    if fault == "vertices":
+        plane.data.vertices[0].co.z = np.nan
+    active_image._before_bake()
+    said = scenes.messages_of(lambda: bpy.ops.object.bake(type="COMBINED"))
+    assert (said == "") == (fault == "none")
+    cleared = scenes.pixels(image)
+    active_image._after_bake()
+    if fault == "none":
+        np.testing.assert_array_equal(scenes.pixels(image), cleared)
+        assert cleared[:, :16].all()
+    else:
+        assert not cleared.any()
+        np.testing.assert_array_equal(scenes.pixels(image), before)
+
+
+@pytest.mark.parametrize("is_cleared", [True, False])
+def test_a_nodes_image_keeps_its_bake_after_a_script(is_cleared):
+    plane = scenes.add_plane(material=scenes.add_material())
+    scenes.add_sun(40, 30)
+    image = with_second_map(plane).image = add_active_image(plane.data.materials[0])
+    before = scenes.bake(plane)[0]
+    bpy.context.scene.render.bake.use_clear = is_cleared
+    assert REFUSED in scenes.messages_of(lambda: bpy.ops.object.bake(type="COMBINED"))
+    bpy.context.view_layer.update()
+    np.testing.assert_array_equal(scenes.pixels(image), before)
+    plane.data.uv_layers.active = plane.data.uv_layers["Second"]
+    assert bpy.ops.object.bake(type="COMBINED") == {"FINISHED"}
+    bpy.context.view_layer.update()
+    assert scenes.pixels(image)[:, :16].all()
+
+
+def test_a_bad_map_of_the_node_does_not_matter_to_an_image_of_ones_own():
+    plane = scenes.add_plane(material=scenes.add_material())
+    scenes.add_sun(40, 30)
+    with_second_map(plane)
+    plane.data.uv_layers["Second"].data.foreach_set("uv", np.float32(np.multiply(scenes.SQUARE_UVS, 3)).ravel())
+    image = add_active_image(plane.data.materials[0])
+    scenes.select(plane)
+    assert scenes.messages_of(lambda: bpy.ops.object.bake(type="COMBINED")) == ""
+    assert scenes.pixels(image).all()
+
+
 @pytest.mark.parametrize("is_chosen", [False, True], ids=["by the bake", "by the node"])
 def test_the_button_refuses_a_nodes_image_by_another_map_before_blender_clears_it(is_chosen):
     plane = scenes.add_plane(material=scenes.add_material())

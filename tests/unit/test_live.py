@@ -190,7 +190,7 @@ def test_a_forgotten_target_is_rendered_again(thread):
 
 def test_an_error_is_handed_over(thread):
     thread.show([live_target(LAMP, albedo=(1.0, 0.5, 0.5))])
-    wait_for(lambda: any("albedo" in rendering.error for rendering in thread.take().values()))
+    wait_for(lambda: any("albedo" in str(rendering.error) for rendering in thread.take().values()))
 
 
 def test_an_error_of_an_exact_rendering_is_handed_over(thread, tmp_path):
@@ -202,7 +202,7 @@ def test_an_error_of_an_exact_rendering_is_handed_over(thread, tmp_path):
     work = thread._work[target.target] = Work()
     thread._render_exactly(target, work, lambda _: True)
     (rendering,) = thread.take().values()
-    assert "There is no folder" in rendering.error
+    assert "There is no folder" in str(rendering.error)
 
 
 @pytest.fixture

@@ -11,7 +11,7 @@ import numpy as np
 
 from ...core.bake.spread import image_length, spread_over_edges
 from ...core.bake.surface import Surface
-from ...core.errors import ImageError, text_of
+from ...core.errors import ImageError, message_of
 from ...core.live.live_target import LiveTarget
 from ...core.live.renderer import for_live
 from ...core.messages import Message, note
@@ -63,7 +63,7 @@ class Reader:
 
     def __init__(self, sky: SkyService) -> None:
         self.targets: list[Target] = []
-        self.errors: dict[Target, str] = {}
+        self.errors: dict[Target, Message] = {}
         self.left_out: list[str] = []
         self._illumination: Illumination | None = None
         self._sky, self._sky_time = sky, -1
@@ -71,7 +71,7 @@ class Reader:
         self._bounces = False  # True if bounced light is asked for
         self._lighting: dict[str, Illumination] = {}  # light on each object
         self._polygons: dict[Target, Polygons] = {}
-        self._unreadable: dict[Target, str] = {}  # errors of targets without polygons
+        self._unreadable: dict[Target, Message] = {}  # errors of targets without polygons
         self._colors: dict[Target, tuple[Size, BaseColor]] = {}  # those of textures, with the size of their image
         self._live_targets: dict[Target, LiveTarget] = {}
 
@@ -150,7 +150,7 @@ class Reader:
                     check_instance(target.object_name, instance, layer)
                     self._polygons[target] = _polygons(target, instance)
             except Exception as error:  # noqa: BLE001 - the other targets are still to be read
-                self._unreadable[target] = text_of(error)
+                self._unreadable[target] = message_of(error)
 
     def _sort_by_distance(self, scene, changes: SceneChanges) -> None:
         """Put the targets nearest to the changed objects first."""
@@ -190,7 +190,7 @@ class Reader:
             color = self._base_color(depsgraph, target, size or side)
             spread = spread_over_edges(node.surface())
         except Exception as error:  # noqa: BLE001 - the other targets are still to be read
-            self.errors[target] = text_of(error)
+            self.errors[target] = message_of(error)
             return None
         parts = {
             "polygons": self._polygons[target],

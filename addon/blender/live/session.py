@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+from dataclasses import replace
 
 import bpy
 
@@ -17,6 +18,7 @@ from ..jobs.state import redraw, restart_views, state
 from ..node.find import find_node
 from ..node.node import image_of_side
 from ..node.output import is_linked
+from ..read.geometry import remedy_for
 from ..read.scene_cache import scene_cache
 from ..read.scene_changes import SceneChanges
 from .preview import Preview
@@ -64,7 +66,7 @@ class Session:
         self._time: int | None = None  # of the last scan, as the cache counts it
         self._targets: list[LiveTarget] = []
         self._previews: dict[ImageKey, Preview] = {}
-        self._errors: dict[Target, str] = {}
+        self._errors: dict[Target, Message] = {}
         self._notes: dict[Target, tuple[Message, ...]] = {}  # of the last rendering
         self._facts: dict[ImageKey, tuple[int, ImageFacts]] = {}  # address and facts of each image in nodes
         self._sizes: dict[tuple, tuple[int, int]] = {}  # of previews without an image, by key and resolution
@@ -140,10 +142,10 @@ class Session:
     def messages(self) -> Messages:
         """Messages for panels."""
         errors = (self._reader.errors | self._errors).items()
-        messages = Messages(Message(Level.ERROR, str(target), error) for target, error in errors)
+        messages = Messages(replace(_for_target(target, error), subject=str(target)) for target, error in errors)
         messages.add(*self._reader.messages())
-        shown = {target.target for target in self._targets}
-        messages.add(*(message for target, notes in self._notes.items() if target in shown for message in notes))
+        notes = ((target.target, self._notes.get(target.target, ())) for target in self._targets)
+        messages.add(*(_for_target(target, message) for target, lines in notes for message in lines))
         nodes = {name: find_node(bpy.data.materials.get(name)) for name, _side in self._previews}
         unseen = [name for name, node in nodes.items() if node is not None and not is_linked(node)]
         if unseen:
@@ -302,10 +304,8 @@ class Session:
             return False
         covering = self._covered_by(rendering)
         if covering is not None:
-            self._errors[target] = (
-                f"Live shows '{covering.object_name}', which has the same material and UVs: "
-                "give this object a material of its own."
-            )
+            text = f"Live shows '{covering.object_name}', which has the same material and UVs."
+            self._errors[target] = Message(Level.ERROR, "", text, "Give this object a material of its own.")
             return False
         former = self._previews.get(target.image_key)
         if former is not None and former is not preview:
@@ -372,6 +372,12 @@ def _facts_of(key: ImageKey) -> tuple[int, ImageFacts]:
     """Address and facts of the image of a side in the node of a material."""
     image = _image_of(key)
     return (0, ImageFacts()) if image is None else (image.as_pointer(), facts_of(image))
+
+
+def _for_target(target: Target, message: Message) -> Message:
+    """The message with a remedy that works for the type of the target's object."""
+    obj = bpy.data.objects.get(target.object_name)
+    return message if obj is None else replace(message, remedy=remedy_for(obj, message.remedy))
 
 
 def is_occupied() -> bool:

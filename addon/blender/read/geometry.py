@@ -34,6 +34,15 @@ NO_FACES_REMEDY = {
 }
 """Remedy by the type of an object without faces."""
 
+FOR_MESHES = "Edit Mode", "Unwrap the mesh"
+"""Words of remedies that work for meshes alone."""
+
+OWN_MAP_REMEDY = (
+    "If its image is an atlas, select all objects of the atlas, and make One Atlas for the Selection again "
+    "(Properties > Render > Beamspread > New Images). If not, clear the node's UV Map: Beamspread's own Bake makes one."
+)
+"""Remedy for an object that has lost its map of our own."""
+
 INFINITE_MATRIX = "Its location, rotation or scale is infinite or not a number."
 MATRIX_REMEDY = "Clear it (Object > Clear), and check constraints and drivers."
 
@@ -263,6 +272,13 @@ def read_polygons(obj, material_name: str, matrix=None, uv_map: str = "", is_til
         obj.to_mesh_clear()
 
 
+def remedy_for(obj, remedy: str) -> str:
+    """The advice about an object: text and curves have neither the Edit Mode nor the UV maps of a mesh."""
+    if obj.type == "MESH" or remedy in NO_FACES_REMEDY.values() or not any(words in remedy for words in FOR_MESHES):
+        return remedy
+    return f"Convert it to a mesh first (Object > Convert > Mesh). {remedy}"
+
+
 def _renders(mesh, name: str) -> bool:
     """True if the UV map of that name is the one that renders."""
     return any(layer.active_render and layer.name == name for layer in mesh.uv_layers)
@@ -291,7 +307,8 @@ def _uvs_by_name(obj, mesh, name: str) -> np.ndarray:
         names = " and ".join(f"'{layer.name}'" for layer in mesh.uv_layers)
         text = f"'{obj.name}' has no UV map '{name}', which the Beamspread node asks for."
         text += f" It has {names}." if names else " It has none."
-        raise ReceiverError(text, "Choose another one in the node, or clear the field.")
+        remedy = "Choose another one in the node, or clear the field."
+        raise ReceiverError(text, OWN_MAP_REMEDY if name == OWN_MAP else remedy)
     return uvs.astype(float)
 
 

@@ -8,7 +8,7 @@ import time
 from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass
 
-from ..errors import text_of
+from ..errors import message_of
 from ..native import native
 from ..progress import Progress
 from ..target import Target
@@ -203,7 +203,7 @@ class RenderThread:
         except native.Cancelled:
             raise
         except Exception as error:  # noqa: BLE001 - the window shows it, and other targets are still to be rendered
-            rendering = Rendering(target.target, error=text_of(error))
+            rendering = Rendering(target.target, error=message_of(error))
         self._renderings.put((work, rendering))
         return not rendering.error
 

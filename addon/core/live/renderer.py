@@ -90,7 +90,7 @@ class Rendering:
     texture: np.ndarray | None = None
     framed: FramedReceiver | None = None
     is_exact: bool = False
-    error: str = ""
+    error: Message | None = None
     messages: tuple[Message, ...] = ()
 
 

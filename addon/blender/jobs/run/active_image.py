@@ -1,13 +1,15 @@
 """The image that Blender's own Bake fills: the one of the active texture node. Textures of the artist are refused.
 
 Blender clears the image before it asks the engine for anything, and writes black to it if the engine refuses. *Bake
-Active Image* therefore refuses beforehand; where Blender's operator was started by itself, refused images get their
-pixels back afterwards. Only in scripts, which tell nobody that they begin, are pixels lost that were never saved.
+Active Image* therefore refuses beforehand. Where Blender's operator was started by itself, refused images get their
+pixels back afterwards, and so do images of nodes whose bake failed or was stopped. Only in scripts, which tell nobody
+that they begin, are pixels lost that were never saved.
 """
 
 from __future__ import annotations
 
 import threading
+from collections.abc import Iterable
 from pathlib import Path
 
 import bpy
@@ -15,10 +17,12 @@ import numpy as np
 from bpy.app.handlers import persistent
 
 from ....core.bake.bake_settings import COMBINED, BakeSettings
+from ....core.bake.runner import CANCELLED, WRITTEN, Bake
 from ....core.errors import ImageError
+from ....core.messages import Level
 from ... import popup
 from ...images.udim import is_tiled
-from ...node.find import BakeTarget, targets_of
+from ...node.find import BakeTarget, find_node, targets_of
 from ...node.output import former_output
 from ...node.tree import own_map
 from ...read.nodes import Links
@@ -184,22 +188,29 @@ class BEAMSPREAD_OT_bake_active(bpy.types.Operator):
 
 
 class _Saved:
-    """Pixels of refused images while Blender's own operator runs without ours, as from its search menu."""
+    """Pixels of images that Blender's own operator clears while it runs without ours, as from its search menu.
+
+    Those of refused images come back, and those of nodes' images for which the engine has no result.
+    """
 
     def __init__(self) -> None:
         self._pixels: dict[str, np.ndarray] = {}
         self._packed: set[str] = set()
-        self._reasons: list[str] = []
+        self._reasons: dict[str, str] = {}  # by the images that get their pixels back; "" where the artist stopped
+        self._filled: set[str] = set()
 
-    def take(self, images: dict) -> None:
-        """Note images before Blender touches them, each with the reason why it is refused."""
-        self._reasons = list(dict.fromkeys(images.values()))
-        self._pixels, self._packed = {}, set()
-        for image in images:
-            if not (0 in image.size or is_tiled(image)):
+    def take(self, refused: dict, others: set) -> None:
+        """Note images before Blender touches them: refused ones with the reason, and others that may get no result."""
+        self.__init__()
+        self._reasons = {image.name: reason for image, reason in refused.items()}
+        for image in {*refused, *others}:
+            if 0 in image.size or is_tiled(image):
+                continue
+            is_packed = not image.is_dirty and image.source != "GENERATED"
+            if is_packed:
+                self._packed.add(image.name)
+            if image in refused or not is_packed:
                 self._take_pixels(image)
-                if not image.is_dirty and image.source != "GENERATED":
-                    self._packed.add(image.name)
 
     def _take_pixels(self, image) -> None:
         self._pixels[image.name] = np.empty(len(image.pixels), np.float32)
@@ -216,42 +227,89 @@ class _Saved:
         if not bpy.context.scene.render.bake.use_clear:
             self._take_pixels(image)
         elif image.packed_files or Path(bpy.path.abspath(image.filepath, library=image.library)).is_file():
-            self._pixels[image.name] = np.empty(len(image.pixels), np.float32)
             self._packed.add(image.name)
         else:
             return False
-        if _after_script not in bpy.app.handlers.depsgraph_update_post:
-            bpy.app.handlers.depsgraph_update_post.append(_after_script)
+        self._reasons.setdefault(image.name, "")
+        self._end_after_script()
         return True
 
+    def _end_after_script(self) -> None:
+        if _after_script not in bpy.app.handlers.depsgraph_update_post:
+            bpy.app.handlers.depsgraph_update_post.append(_after_script)
+
     def has(self, image) -> bool:
-        """True if the image gets its pixels back."""
-        return image.name in self._pixels
+        """True if the image can get its pixels back."""
+        return image.name in self._pixels or image.name in self._packed
+
+    def lose(self, image, reason: str) -> None:
+        """Note that the engine has no result for an image; a reason is shown."""
+        if image.name not in self._filled and (self.has(image) or self.take_in_script(image)):
+            self._reasons[image.name] = self._reasons.get(image.name) or reason
+
+    def fill(self, image) -> None:
+        """Note that an image has a result, maybe that of one object among several."""
+        self._filled.add(image.name)
+        if threading.current_thread() is threading.main_thread():
+            self._end_after_script()
 
     def give_back(self) -> None:
         """Restore the pixels: of files and packed images that had no other ones, from these."""
-        for name, pixels in self._pixels.items():
-            image = bpy.data.images.get(name)
-            if image is None or len(image.pixels) != len(pixels):
-                continue
-            if name in self._packed:
-                image.reload()
-            else:
-                image.pixels.foreach_set(pixels)
-                image.update()
-        if self._pixels:
-            kept = "The images have their pixels again." if len(self._pixels) > 1 else "The image has its pixels again."
-            popup.show_soon("Beamspread: nothing was baked", [*self._reasons, kept])
-        self._pixels, self._packed, self._reasons = {}, set(), []
+        given = [name for name in self._reasons if name not in self._filled and self._give_back(name)]
+        reasons = list(dict.fromkeys(filter(None, map(self._reasons.get, given))))
+        if reasons:
+            kept = "The images have their pixels again." if len(given) > 1 else "The image has its pixels again."
+            popup.show_soon("Beamspread: nothing was baked", [*reasons, kept])
+        self.__init__()
+
+    def _give_back(self, name: str) -> bool:
+        image, pixels = bpy.data.images.get(name), self._pixels.get(name)
+        if image is None or (pixels is not None and len(image.pixels) != len(pixels)):
+            return False
+        if name in self._packed:
+            # `reload` would pack the image's file again, if there is one.
+            image.buffers_free()
+            image.gl_free()
+        elif pixels is not None:
+            image.pixels.foreach_set(pixels)
+            image.update()
+        return name in self._packed or pixels is not None
 
 
 _saved = _Saved()
 
 
+def note_results(bakes: Iterable[Bake]) -> None:
+    """Note which images of nodes Blender's Bake fills, and which it only clears, by bakes for the active images."""
+    for bake in bakes:
+        material = bpy.data.materials.get(bake.target.material_name)
+        image = active_image(material)
+        if image is None or image not in _images_of_nodes(material):
+            continue
+        if bake.status == WRITTEN:
+            _saved.fill(image)
+        else:
+            errors = [str(message) for message in bake.messages.of(Level.ERROR)]
+            _saved.lose(image, "" if bake.status == CANCELLED else " ".join(errors))
+
+
+def _images_of_nodes(material) -> set:
+    """Images that the material's Beamspread node shows."""
+    node = find_node(material)
+    return set() if node is None else {node.image, node.image_back} - {None}
+
+
+def _images_at_risk(context) -> set:
+    """Images of nodes that Blender's Bake clears, by the selected objects."""
+    objects = [obj for obj in list(context.view_layer.objects.selected)[:MAX_OBJECTS] if obj.type == "MESH"]
+    materials = {slot.material for obj in objects for slot in obj.material_slots} - {None}
+    return {image for image in map(active_image, materials) if any(image in _images_of_nodes(m) for m in materials)}
+
+
 @persistent
 def _before_bake(*_arguments) -> None:
     if bpy.context.scene.render.engine == ENGINE:
-        _saved.take(refusals(bpy.context, by_active_map=False))
+        _saved.take(refusals(bpy.context, by_active_map=False), _images_at_risk(bpy.context))
 
 
 def _after_script(*_arguments) -> None:

@@ -24,8 +24,8 @@ from ...registration import all_or_nothing, classes, handlers
 from ..out_of_date import stale
 from ..out_of_date.fingerprint import Parts
 from ..state import state
-from .active_image import ENGINE, active_image, check_active_image, other_map
-from .bake_plan import BakePlan, FailedPlan, Plan, read_plans
+from .active_image import ENGINE, active_image, check_active_image, note_results, other_map
+from .bake_plan import FailedPlan, Plan, read_plans
 from .render_copy import render_picture, show_by_eevee
 
 MAX_PROBED = 1000
@@ -66,6 +66,7 @@ def bake_active_image(engine, depsgraph, obj, width: int, height: int) -> None:
         for bake in bakes:
             for message in bake.messages:
                 engine.report({message.level.value}, f"{bake.target}: {message}")
+        note_results(bakes)
         if all(bake.status == WRITTEN for bake in bakes):
             compat.write_pass(passes["Combined"], sink.pixels)
             filled = True
@@ -117,11 +118,12 @@ def _in_map_of_blender(plans: list[Plan], depsgraph, obj, uv_maps: list[str], ar
     """Plans of bakes in the UV map that Blender's Bake fills; of failures where the node shows its image by another."""
     result = []
     for plan in plans:
-        own = plan.mesh.uv_map or _rendered_map(obj) if isinstance(plan, BakePlan) else ""
-        if not (own and uv_maps) or own in uv_maps:
+        has_failed = isinstance(plan, FailedPlan)  # perhaps by the node's map, which another image does not use
+        own = "" if has_failed else plan.mesh.uv_map or _rendered_map(obj)
+        if not uv_maps or own in uv_maps or not (own or has_failed):
             result.append(plan)
         elif image_of(plan.target) == active_image(bpy.data.materials[plan.target.material_name]):
-            result.append(FailedPlan(plan.target, other_map(uv_maps[0], own)))
+            result.append(plan if has_failed else FailedPlan(plan.target, other_map(uv_maps[0], own)))
         else:
             result += read_plans(depsgraph, [plan.target], *arguments, uv_map=uv_maps[0])
     return result

@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 
 from ....core.bake.spread import length_of, lengths_of_tiles, spread_over_edges
 from ....core.bake.surface import Surface
+from ....core.errors import ReceiverError
 from ....core.messages import Message
 from ....core.scene.flat_mesh import FlatMesh, flatten
 from ....core.scene.receiver import texture_size
@@ -17,7 +18,7 @@ from ...images.files import check_image
 from ...images.image_operators import wanted_size
 from ...images.udim import sizes_for
 from ...node.find import BakeTarget, targets_of, uses_tiles
-from ...read.geometry import read_polygons
+from ...read.geometry import read_polygons, remedy_for
 from ...read.visibility import ObjectInstance
 from ...settings import BeamspreadSettings
 
@@ -50,19 +51,15 @@ def read_receiver(
         instance.obj, target.material_name, instance.matrix, uv_map or evaluated.node.uv_map, is_tiled
     )
     path = min(surface.material.mean_free_path)
-    mesh = flatten(polygons, path, target.object_name, spread_over_edges(surface), surface.thickness > 0)
-    if instance.obj.type != "MESH":
-        mesh = replace(mesh, messages=tuple(map(_for_curves, mesh.messages)))
+    try:
+        mesh = flatten(polygons, path, target.object_name, spread_over_edges(surface), surface.thickness > 0)
+    except ReceiverError as error:
+        raise ReceiverError(error.text, remedy_for(instance.obj, error.remedy)) from error
+    for_type = (replace(message, remedy=remedy_for(instance.obj, message.remedy)) for message in mesh.messages)
+    mesh = replace(mesh, messages=tuple(for_type))
     if outcome is not None:
         mesh = replace(mesh, messages=(outcome, *mesh.messages))
     return Receiving(evaluated, instance, surface, mesh, is_tiled)
-
-
-def _for_curves(message: Message) -> Message:
-    """The message about a text or a curve, whose Edit Mode is not that of a mesh."""
-    if "Edit Mode" not in message.remedy:
-        return message
-    return replace(message, remedy=f"Convert it to a mesh first (Object > Convert > Mesh). {message.remedy}")
 
 
 def sized(
