@@ -206,7 +206,7 @@ class BeamspreadPreferences(bpy.types.AddonPreferences):
         row.operator("beamspread.clear_cache", icon="TRASH")
         layout.label(text=str(library.cache_folder()))  # a row of its own: a button would cut it off
         if url := documentation("guide"):
-            layout.operator("wm.url_open", text="Documentation", icon="HELP").url = url
+            layout.operator("wm.url_open", text="Help Pages", icon="HELP").url = url
 
 
 class BEAMSPREAD_OT_clear_cache(bpy.types.Operator):

@@ -106,8 +106,8 @@ class BeamspreadSettings(bpy.types.PropertyGroup):
     )
     samples: IntProperty(
         name="Samples",
-        description="Set the quality of soft shadows. Twice the value takes four times as long: 4 casts 16 rays per "
-        "pixel to each lamp without a size, and up to 1024 (4096 from 8 on) to all other lights together",
+        description="Set the number of rays for light and shadows. Twice the value takes four times as long and "
+        "halves the noise",
         default=4,
         min=1,
         soft_max=16,

@@ -116,7 +116,7 @@ class Material:
 def check_thickness(thickness: float) -> None:
     """Raise MaterialError unless `thickness` (metres, 0: half-space) can be simulated."""
     if not (thickness >= 0 and math.isfinite(thickness)):
-        raise MaterialError(f"The thickness is {thickness:g}.", "It must be above 0; 0 is infinitely thick.")
+        raise MaterialError(f"The thickness is {thickness:g}.", "It must be 0, for infinitely thick, or more.")
 
 
 def check_base_color(color: RGB) -> None:

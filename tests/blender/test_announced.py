@@ -102,7 +102,7 @@ def test_a_medium_to_simulate_is_named_with_its_share():
     add_sun()
     bpy.context.scene.beamspread.quality = "final"
     select(plane("Skin", ior=1.37))
-    assert "simulate 'Medium of Skin' (once)" in panel()
+    assert "to simulate 'Medium of Skin', only once" in panel()
     bpy.context.scene.beamspread.quality = "preview"
     beamspread.library(beamspread.Medium(0.8, 1.37), quality="preview")
     assert library.is_known(beamspread.Medium(0.8, 1.37), "preview")

@@ -292,7 +292,7 @@ def test_a_bake_of_all_keeps_the_light_of_a_material_with_an_unused_node():
     assert np.array_equal(scenes.pixels(scenes.image_of(plane)), alone)
     output = material.node_tree.get_output_node("ALL")
     assert output.inputs["Surface"].links[0].from_node == emission
-    assert any("shines by 'Emission'" in line for line in state.lines())
+    assert any("emits light by 'Emission'" in line for line in state.lines())
     bpy.ops.beamspread.bake(objects="ALL")
     assert np.array_equal(scenes.pixels(scenes.image_of(plane)), alone)
 

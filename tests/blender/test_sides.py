@@ -123,7 +123,9 @@ def test_names_of_images_do_not_collide():
     # The same image for both is an error with a remedy.
     node.image_back = node.image
     scenes.select(plane)
-    assert "both sides of 'Sheet'. Clear Back Image" in scenes.messages_of(bpy.ops.beamspread.bake)
+    assert "Both sides of 'Sheet' have the image 'Sheet_Medium'. Clear Back Image" in scenes.messages_of(
+        bpy.ops.beamspread.bake
+    )
 
 
 @pytest.mark.parametrize("output", ["IRRADIANCE", "DIRECTION"])

@@ -31,7 +31,7 @@ def test_blender_s_own_bake_leaves_a_texture_of_the_node_as_it_was(seen, clear):
     assert seen[f"texture, {clear}"] == [0.5]
     ((title, (why, kept)),) = seen[f"popups of the texture, {clear}"]
     assert title == "Beamspread: nothing was baked"
-    assert "'Texture' is a texture of the Beamspread node" in why
+    assert "'Texture', a texture of the Beamspread node" in why
     assert kept == "The image has its pixels again."
 
 

@@ -281,7 +281,7 @@ class LightByCycles(Step):
         noise, irradiance = float(arrays["noise"]), float(arrays["irradiance"])
         fraction = irradiance / without_obstacles if without_obstacles > 0 else math.inf * (irradiance > 0)
         if fraction >= NEGLIGIBLE and noise > NOISY * NOISE:
-            text = f"{doing} on '{job.name}' ended with {100 * noise:.1f} % of noise, relative to all light there."
+            text = f"{doing} on '{job.name}' left {100 * noise:.1f} % of noise, relative to all light there."
             job = replace(job, illumination=job.illumination.with_messages(note(job.name, text)))
         return job, fields, fraction
 

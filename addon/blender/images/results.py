@@ -237,7 +237,7 @@ class Results:
         for owner in self._other_owners(image, bake):
             if owner.material_name == target.material_name and self._covers(owner, image, bake):
                 if owner.object_name == target.object_name:
-                    text = f"The image '{image.name}' is that of both sides of '{owner.object_name}'."
+                    text = f"Both sides of '{owner.object_name}' have the image '{image.name}'."
                     raise BakeError(text, "Clear Back Image in the node: the bake makes a new one.")
                 raise BakeError(
                     f"'{owner.object_name}' is baked to the same part of the image '{image.name}' by the same "

@@ -274,7 +274,7 @@ def simulation_line(announced: dict[Target, Announced], targets: Iterable[Target
     if seconds < MIN_SIMULATION:
         return ""
     first, *rest = names
-    return f"Of which {duration(seconds)} simulate {first}{f' and {len(rest)} more' if rest else ''} (once)"
+    return f"Includes {duration(seconds)} to simulate {first}{f' and {len(rest)} more' if rest else ''}, only once"
 
 
 def spread_lines(announced: dict[Target, Announced], targets: Iterable[Target]) -> list[str]:

@@ -112,7 +112,7 @@ class Reader:
                 shown = f"Live can't evaluate the Base Color of '{target.object_name}' and shows the node's own color"
                 messages.append(note("", f"{shown}; bakes have Cycles evaluate it. {color.unknown}"))
             if color.texture is not None and (size if isinstance(size, int) else max(size)) > MAX_TEXELS:
-                text = f"Live has the texture of '{target.material_name}' with {MAX_TEXELS} texels along a side."
+                text = f"Live shows the texture of '{target.material_name}' with {MAX_TEXELS} texels along a side."
                 messages.append(note("", text))
         return messages
 

@@ -152,7 +152,7 @@ class Session:
             names = ", ".join(f"'{name}'" for name in unseen)
             messages.add(note("", f"Live's pictures of {names} are not shown: bake, or link the node to the output."))
         if self._sky.problem:
-            messages.add(note("", f"Live has no light of the sky. {self._sky.problem}"))
+            messages.add(note("", f"Live shows no light from the sky. {self._sky.problem}"))
         medium = self._thread.libraries.simulating
         if medium:
             messages.add(note("", f"Live first simulates the medium ({medium}), in preview quality."))

@@ -83,7 +83,7 @@ class BEAMSPREAD_OT_make_plain(NodeOperator, bpy.types.Operator):
             self.report({"ERROR"}, str(error))
             return {"CANCELLED"}
         if plain.leaves_out_back(node):
-            self.report({"WARNING"}, "These nodes show the image of the front on both faces: the kind Group shows each")
+            self.report({"WARNING"}, "Both faces show the image of the front. Choose Group to show each its own")
         if plain.is_map_of_modifier(node):
             text = f"glTF files lack the UV map '{plain.map_of(node)}', which a modifier makes: apply the modifier"
             self.report({"WARNING"}, text)

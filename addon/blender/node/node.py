@@ -296,7 +296,7 @@ class BeamspreadNode(ColorProperties, PathProperties, bpy.types.ShaderNodeCustom
             (
                 MULTIPLIED,
                 "Multiplied",
-                "As in other renderers: light of a medium of the mean color, times the texture on its way in and out",
+                "As in other renderers: light spreads in the mean color, times the texture on its way in and out",
                 0,
             ),
             (

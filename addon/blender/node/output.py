@@ -81,7 +81,7 @@ def link_output(node) -> list[Message]:
         text = f"'{name}' shows '{shader.name}' instead of the bake."
         return [warning(name, text, "Show Baked Result in its node changes that.")]
     if _shines(surface):
-        text = f"'{name}' shines by '{shader.name}', so it does not show the bake."
+        text = f"'{name}' emits light by '{shader.name}', so it does not show the bake."
         return [warning(name, text, "Show Baked Result in its node changes that, and takes its light away.")]
     _remember(node, surface.links[0])
     _link(surface, node)

@@ -112,7 +112,7 @@ class PathProperties:
     )
     is_infinite: BoolProperty(
         name="Infinite Depth",
-        description="Let light spread into the depth without end. Off: the material is a slab of the thickness below",
+        description="Make the material infinitely thick. Off: a slab of the thickness below",
         get=lambda node: node.thickness == 0,
         set=_set_infinite,
         options=set(),

@@ -58,7 +58,7 @@ def _read(depsgraph, cache: SceneCache, medium_of: MediumOf | None) -> Illuminat
         is_solid = obj.type in GEOMETRY_TYPES
         is_hidden = is_solid and not (lights_surfaces(obj, instancer) and casts_shadows(obj, instancer))
         if is_hidden and occluders.reflects(obj):
-            hidden.append(f"'{obj.name}' is hidden from some of the light.")
+            hidden.append(f"'{obj.name}' is hidden from some kinds of light rays.")
         if lights_surfaces(obj, instancer):
             if obj.type == "LIGHT":
                 lights.add_lamp(obj, instance.matrix_world)
@@ -225,7 +225,7 @@ class _Lights:
 
     def _note_links(self, name: str, links: dict) -> None:
         if any(names is not None for names in links.values()):
-            self.untraceable = self.untraceable or f"The light of '{name}' is linked to some objects alone."
+            self.untraceable = self.untraceable or f"The light of '{name}' is linked to some objects only."
 
 
 def links_of(obj, names: set[str]) -> dict[str, frozenset[str] | None]:

@@ -144,7 +144,7 @@ class BaseColor:
             text = f"The texture of '{object_name}' has scattering albedos of 1 or more, which absorb nothing."
             return cls(texture, (warning(object_name, text, f"They are cut to {MAX_ALBEDO}."),))
         if use.is_albedo and max(mean_color(receiver, texture.colors)) < DARK_ALBEDO:
-            text = f"The texture of '{object_name}' counts as scattering albedo, so that the surface is dark."
+            text = f"The texture of '{object_name}' is read as scattering albedo, so the surface is dark."
             return cls(texture, (note(object_name, text, "If it shows colors, set Color to Base Color."),))
         if largest > BRIGHTEST:
             text = f"The Base Color of '{object_name}' is above 1 in places, which reflects more light than arrives."

@@ -56,7 +56,7 @@ QUICK_PREVIEW = "first look"  # as files of earlier versions have it
 
 UNKNOWN = (
     "Changes since its bake are not known: an earlier version of the add-on made it.",
-    "Bake it again to be told of later ones.",
+    "Bake it again: later changes will be named here.",
 )
 
 _waiting: list[tuple[Bake, Parts | None]] = []

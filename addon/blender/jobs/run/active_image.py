@@ -53,15 +53,16 @@ def check_active_image(target: BakeTarget, settings: BakeSettings, is_running: b
         return
     if is_tiled(active):
         raise ImageError(
-            f"The active image '{active.name}' has UDIM tiles, which Blender's own Bake can't fill by Beamspread.",
+            f"The active image '{active.name}' has UDIM tiles, which Blender's own Bake can't fill with Beamspread.",
             "Choose it in the Beamspread node, and use Bake Beamspread.",
         )
     reader = _reader(active, target)
     if reader:
-        remedy = "Add an Image Texture node with another image, and select that."
+        remedy = "Select an Image Texture node with another image."
         if is_running and not (_saved.has(active) or _saved.take_in_script(active)):
             remedy = f"Blender has cleared it, and no file has its pixels. {remedy}"
-        raise ImageError(f"The active image '{active.name}' is a texture of {reader} and no target.", remedy)
+        text = f"Blender's own Bake would erase the active image '{active.name}', a texture of {reader}."
+        raise ImageError(text, remedy)
     if settings.layer != COMBINED and active in (target.node.image, target.node.image_back):
         raise ImageError(
             f"The image '{active.name}' shows luminance in the Beamspread node.",
