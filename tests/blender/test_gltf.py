@@ -112,6 +112,20 @@ def test_a_bake_after_them_changes_them_and_they_go_again(tmp_path):
     assert {node.bl_idname for node in material.node_tree.nodes} & {"ShaderNodeTexImage", "ShaderNodeUVMap"} == set()
 
 
+@pytest.mark.parametrize("kind", [plain.COAT, plain.EMISSION, plain.UNLIT])
+def test_they_cover_no_other_node(kind):
+    plane, material, _ = baked_plane(BRIGHT)
+    tree, node = material.node_tree, node_of(material)
+    output, before = tree.get_output_node("ALL"), set(tree.nodes)
+    node.location = output.location.x - node.width - 40, output.location.y
+    select(plane)
+    bpy.ops.beamspread.make_plain(kind=kind)
+    for new in set(tree.nodes) - before:
+        assert new.location.x + new.width < output.location.x
+        height = 720 if new.bl_idname == "ShaderNodeBsdfPrincipled" else 300  # without a window, no node has its size
+        assert new.location.y - height > node.location.y
+
+
 def with_emission(plane, material):
     """The node's Color as emission, and a texture as its base color."""
     nodes, node = Nodes(material), node_of(material)

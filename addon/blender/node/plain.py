@@ -35,6 +35,10 @@ SOURCE = "beamspread_source"
 
 LABEL = "Baked Light"
 
+ABOVE, ABOVE_IMAGE, ABOVE_PRINCIPLED, GAP = 320, 520, 760, 40
+"""Distances of plain nodes above the Beamspread node, so that an image node, one over it and a Principled BSDF find
+place there; and the gap between columns."""
+
 # Keys of the image node: names of the other nodes.
 _SHADER, _SCALED, _MAP = "beamspread_shader", "beamspread_scaled", "beamspread_map"
 _EXPOSURE = EXPOSURE_KEY
@@ -77,7 +81,7 @@ def make(node, kind: str) -> float:
     """
     encoded, exposure = encoded_image(node.shown_images()[0])
     tree = node.id_data
-    image = _add(tree, "ShaderNodeTexImage", LABEL, node, (0, 0))
+    image = _add(tree, "ShaderNodeTexImage", LABEL, node, -1)
     image.image, image.extension = encoded, "EXTEND"
     image[PLAIN] = kind
     node.plain_node = image.name
@@ -195,10 +199,11 @@ def _srgb() -> str:
         bpy.data.images.remove(named)
 
 
-def _add(tree, kind: str, label: str, node, offset: tuple[int, int]):
+def _add(tree, kind: str, label: str, node, column: int, above: int = ABOVE):
+    """Add a node above the Beamspread node, `column` steps of its width to the right; the output stays free."""
     new = tree.nodes.new(kind)
     new.name = new.label = label
-    new.location = node.location.x + offset[0], node.location.y + 320 + offset[1]
+    new.location = node.location.x + column * (node.width + GAP), node.location.y + above
     return new
 
 
@@ -234,10 +239,10 @@ def _strength(shader):
 def _add_shader(node, image, kind: str) -> None:
     tree = node.id_data
     if kind == EMISSION:
-        shader = _add(tree, "ShaderNodeEmission", LABEL, node, (320, 0))
+        shader = _add(tree, "ShaderNodeEmission", LABEL, node, 0)
         color = shader.inputs["Color"]
     else:
-        shader = _add(tree, "ShaderNodeBsdfPrincipled", LABEL, node, (320, 0))
+        shader = _add(tree, "ShaderNodeBsdfPrincipled", LABEL, node, 0, ABOVE_PRINCIPLED)
         color = shader.inputs["Emission Color" if "Emission Color" in shader.inputs else "Emission"]
         _set_coat(node, shader)
     image[_SHADER] = shader.name
@@ -271,7 +276,7 @@ def _show_map(node, image) -> None:
         return
     is_exported = not is_map_of_modifier(node)
     kind, attribute, output = ("UVMap", "uv_map", "UV") if is_exported else ("Attribute", "attribute_name", "Vector")
-    new = _add(tree, f"ShaderNode{kind}", "Baked UV Map", node, (-220, 0))
+    new = _add(tree, f"ShaderNode{kind}", "Baked UV Map", node, -2)
     setattr(new, attribute, name)
     image[_MAP] = new.name
     tree.links.new(image.inputs["Vector"], new.outputs[output])
@@ -321,7 +326,7 @@ def _scaled(node, image, exposure: float):
     """Node that divides the image by its exposure."""
     scaled = _part(image, _SCALED)
     if scaled is None:
-        scaled = _add(node.id_data, "ShaderNodeVectorMath", "Baked Radiance", node, (320, 200))
+        scaled = _add(node.id_data, "ShaderNodeVectorMath", "Baked Radiance", node, -1, ABOVE_IMAGE)
         scaled.operation = "SCALE"
         image[_SCALED] = scaled.name
         node.id_data.links.new(scaled.inputs[0], image.outputs["Color"])
