@@ -350,7 +350,7 @@ EnvironmentLight::EnvironmentLight(const View2D<const Vec3f>& radiance, const Ma
     }
 }
 
-std::shared_ptr<const Light> EnvironmentLight::facing(const Vec3& normal) const
+std::shared_ptr<const Light> EnvironmentLight::facing(const Vec3& normal, std::span<const Vec3> /*points*/) const
 {
     return prepared(m_facing, normal);
 }
@@ -381,12 +381,12 @@ std::shared_ptr<const Light> EnvironmentLight::prepared(std::vector<Prepared>& l
 void EnvironmentLight::sample(std::span<const Vec3> points, const Vec3& normal, std::span<const Vec2> square,
                               LightRay* rays) const
 {
-    facing(normal)->sample(points, normal, square, rays);
+    facing(normal, {})->sample(points, normal, square, rays);
 }
 
 Vec3 EnvironmentLight::irradiance(const Vec3& point, const Vec3& normal) const
 {
-    return facing(normal)->irradiance(point, normal);
+    return facing(normal, {})->irradiance(point, normal);
 }
 
 }  // namespace beamspread

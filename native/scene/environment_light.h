@@ -34,7 +34,7 @@ public:
                 LightRay* rays) const override;
     Vec3 irradiance(const Vec3& point, const Vec3& normal) const override;
     // The last ones are kept: a bake asks for the same light several times.
-    std::shared_ptr<const Light> facing(const Vec3& normal) const override;
+    std::shared_ptr<const Light> facing(const Vec3& normal, std::span<const Vec3> points) const override;
     std::shared_ptr<const Light> facing_all() const override;
     bool is_colored() const override { return m_is_colored; }
 

@@ -66,8 +66,12 @@ public:
     // True if rays of the light differ in color; otherwise all channels of a ray's flux are equal.
     virtual bool is_colored() const { return false; }
 
-    // The same light prepared for surfaces with that normal; null if preparation does not pay.
-    virtual std::shared_ptr<const Light> facing(const Vec3& /*normal*/) const { return nullptr; }
+    // The same light prepared for a rectangle with that normal; null if preparation does not pay. `points` lie evenly on
+    // it, its four corners first.
+    virtual std::shared_ptr<const Light> facing(const Vec3& /*normal*/, std::span<const Vec3> /*points*/) const
+    {
+        return nullptr;
+    }
 
     // The same light prepared for points anywhere with any normal; null if preparation does not pay.
     virtual std::shared_ptr<const Light> facing_all() const { return nullptr; }

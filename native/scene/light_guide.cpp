@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <ranges>
 
 namespace beamspread {
 
@@ -43,7 +44,7 @@ constexpr double min_evidence = 10.0;
 constexpr double known_spreads = 2.5;
 
 // Clusters part where the widest gap between hits is more than this fraction of their extent. Less: more clusters.
-constexpr double min_gap = 0.35;
+constexpr float min_gap = 0.35f;
 constexpr std::size_t max_clusters = 6;
 
 // Index of the first end above a number, at most the last.
@@ -64,31 +65,53 @@ bool is_within(const Vec2& inside, const Vec2& size)
     return inside.x <= size.x && inside.y <= size.y;
 }
 
-// The widest gap between hits that are sorted along an axis, and the first hit after it.
+// The widest gap between neighboring places along an axis, and the outermost places.
 struct Gap {
-    double width = 0.0;
-    std::size_t end = 0;
+    float low = 0.0f, high = 0.0f;  // ends of the gap
+    float first = 0.0f, last = 0.0f;
+
+    float width() const { return high - low; }
+    float extent() const { return last - first; }
 };
 
-Gap sort_and_find_gap(std::span<LightHit> hits, Vec2f::length_type axis)
+// Without sorting: of n places in n - 1 equal cells between the first and the last, the widest gap lies between cells, not
+// within one.
+Gap find_gap(std::span<const LightHit> hits, Vec2f::length_type axis, std::vector<Vec2f>& cells)
 {
-    std::ranges::sort(hits, {}, [axis](const LightHit& hit) { return hit.place[axis]; });
-    Gap widest;
-    for (std::size_t i = 1; i < hits.size(); ++i) {
-        const double width = hits[i].place[axis] - hits[i - 1].place[axis];
-        if (width > widest.width)
-            widest = {width, i};
+    const auto place = [axis](const LightHit& hit) { return hit.place[axis]; };
+    const auto [first, last] = std::ranges::minmax(hits | std::views::transform(place));
+    Gap widest{.low = first, .high = first, .first = first, .last = last};
+    if (!(first < last))
+        return widest;
+    const auto count = static_cast<float>(hits.size() - 1);
+    // [cell] first and last place
+    cells.assign(hits.size(), Vec2f(std::numeric_limits<float>::max(), std::numeric_limits<float>::lowest()));
+    for (const LightHit& hit : hits) {
+        Vec2f& cell = cells[static_cast<std::size_t>((place(hit) - first) / (last - first) * count)];
+        cell = {std::min(cell.x, place(hit)), std::max(cell.y, place(hit))};
+    }
+    float before = first;
+    for (const Vec2f& cell : cells) {
+        if (cell.x > cell.y)
+            continue;
+        if (cell.x - before > widest.width()) {
+            widest.low = before;
+            widest.high = cell.x;
+        }
+        before = cell.y;
     }
     return widest;
 }
 
 // Moves places by 1 so that the widest gap lies around them: light may go on beyond a border of the square, as that of
 // the sky does, which is round.
-void unwrap(std::span<LightHit> hits, Vec2f::length_type axis)
+void unwrap(std::span<LightHit> hits, Vec2f::length_type axis, std::vector<Vec2f>& cells)
 {
-    const Gap gap = sort_and_find_gap(hits, axis);
-    if (gap.width > 1.0 + hits.front().place[axis] - hits.back().place[axis])
-        for (LightHit& hit : hits.first(gap.end))
+    const Gap gap = find_gap(hits, axis, cells);
+    if (gap.width() <= 1.0f - gap.extent())
+        return;
+    for (LightHit& hit : hits)
+        if (hit.place[axis] <= gap.low)
             hit.place[axis] += 1.0f;
 }
 
@@ -245,8 +268,8 @@ void LightGuide::assign(std::span<LightHit> hits)
     m_ends.clear();
     if (hits.empty())
         return;
-    unwrap(hits, 0);
-    unwrap(hits, 1);
+    unwrap(hits, 0, m_cells);
+    unwrap(hits, 1, m_cells);
     add_clusters(hits);
     for (double& end : m_ends)
         end /= m_ends.back();
@@ -257,10 +280,12 @@ void LightGuide::add_clusters(std::span<LightHit> hits)
 {
     if (hits.size() > 1 && m_clusters.size() + 1 < max_clusters)
         for (const Vec2f::length_type axis : {0, 1}) {
-            const Gap gap = sort_and_find_gap(hits, axis);
-            if (gap.width > min_gap * (hits.back().place[axis] - hits.front().place[axis])) {
-                add_clusters(hits.first(gap.end));
-                add_clusters(hits.subspan(gap.end));
+            const Gap gap = find_gap(hits, axis, m_cells);
+            if (gap.width() > min_gap * gap.extent()) {
+                const auto after = std::partition(hits.begin(), hits.end(),
+                                                  [&](const LightHit& hit) { return hit.place[axis] <= gap.low; });
+                add_clusters(std::span(hits.begin(), after));
+                add_clusters(std::span(after, hits.end()));
                 return;
             }
         }

@@ -77,7 +77,8 @@ private:
     void add_clusters(std::span<LightHit> hits);
 
     std::vector<HitCluster> m_clusters;
-    std::vector<double> m_ends;  // [cluster] probability up to its end, among guided rays
+    std::vector<double> m_ends;   // [cluster] probability up to its end, among guided rays
+    std::vector<Vec2f> m_cells;   // working memory
 };
 
 }  // namespace beamspread

@@ -118,7 +118,7 @@ std::vector<LightHit> LightSearch::hits_around(std::size_t tile) const
         nearest = m_tiles[i].hits;
         const std::size_t count = std::min(nearest.size(), hits_of_neighbor);
         const auto end = nearest.begin() + static_cast<std::ptrdiff_t>(count);
-        std::ranges::partial_sort(nearest, end, {}, distance);
+        std::ranges::nth_element(nearest, end, {}, distance);
         hits.insert(hits.end(), nearest.begin(), end);
     });
     return hits;

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <memory>
+#include <numeric>
 #include <string>
 
 #include "base/error.h"
@@ -24,11 +25,18 @@ constexpr double sizes_to_small = 20.0 * 20.0;
 // noise little: over the face irradiance then hardly changes.
 constexpr double near_in_squared_sizes = 4.0;
 
+// Part of the rays that choose faces by their power, so that none is left out where it matters, between the points at which
+// irradiance is known. More: more rays that bring little.
+constexpr double power_share = 0.1;
+
+// Squared size of a face, as a fraction, that is added to its squared distance: beside it irradiance stays finite.
+constexpr double near_to_point = 0.25;
+
 }  // namespace
 
 MeshLight::MeshLight(std::span<const Vec3> vertices, std::span<const Triangle> triangles,
-                     std::span<const Vec3f> radiance)
-    : m_cumulated{0.0}
+                     std::span<const Vec3f> radiance, bool is_closed)
+    : m_cumulated{0.0}, m_is_closed(is_closed)
 {
     for (const Vec3& vertex : vertices)
         detail::check_finite("vertices", vertex);
@@ -61,20 +69,85 @@ MeshLight::MeshLight(std::span<const Vec3> vertices, std::span<const Triangle> t
     }
 }
 
+// Height of the highest corner of a face above the plane at a point.
+double MeshLight::height_of(const Face& face, const Vec3& point, const Vec3& normal)
+{
+    const auto height = [&](std::size_t k) { return glm::dot(normal, face.corners[k] - point); };
+    return std::max({height(0), height(1), height(2)});
+}
+
+bool MeshLight::shows_fronts_alone(const Vec3& point) const
+{
+    return m_is_closed && glm::any(glm::lessThan(point, m_low) || glm::greaterThan(point, m_high));
+}
+
 double MeshLight::distance_from(const Vec3& point) const
 {
     return glm::distance(point, glm::clamp(point, m_low, m_high));
 }
 
-std::shared_ptr<const Light> MeshLight::facing_all() const
+std::shared_ptr<MeshLight> MeshLight::without_faces() const
 {
     // make_shared can't reach the private constructor.
     std::shared_ptr<MeshLight> light(new MeshLight());
     light->m_low = m_low;
     light->m_high = m_high;
+    light->m_cumulated = {0.0};
+    light->m_is_colored = m_is_colored;
+    light->m_is_closed = m_is_closed;
+    return light;
+}
+
+std::shared_ptr<const Light> MeshLight::facing(const Vec3& normal, std::span<const Vec3> points) const
+{
+    const std::span corners = points.first(4);
+    Vec3 low = corners[0];
+    Vec3 high = corners[0];
+    for (const Vec3& corner : corners) {
+        low = glm::min(low, corner);
+        high = glm::max(high, corner);
+    }
+    // Then no point of the rectangle lies in the bounds.
+    const bool has_fronts_alone = m_is_closed && glm::any(glm::lessThan(high, m_low) || glm::greaterThan(low, m_high));
+    const auto is_hidden = [&](const Face& face) {
+        return std::ranges::all_of(corners, [&](const Vec3& point) {
+            return height_of(face, point, normal) <= 0.0 || (has_fronts_alone && shows_back(face, point));
+        });
+    };
+    std::shared_ptr<MeshLight> light = without_faces();
+    std::vector<double> brought, power;
+    for (std::size_t i = 0; i < m_faces.size(); ++i) {
+        const Face& face = m_faces[i];
+        if (is_hidden(face))
+            continue;
+        double irradiance = 0.0;
+        for (const Vec3& point : points) {
+            const double height = height_of(face, point, normal);
+            if (height <= 0.0 || (shows_fronts_alone(point) && shows_back(face, point)))
+                continue;
+            const Vec3 way = middle(face) - point;
+            const double squared = glm::dot(way, way) + near_to_point * face.squared_size;
+            irradiance += std::abs(glm::dot(face.normal, way)) * height / (squared * squared);
+        }
+        light->m_faces.push_back(face);
+        brought.push_back(irradiance * (face.radiance.x + face.radiance.y + face.radiance.z));
+        power.push_back(m_cumulated[i + 1] - m_cumulated[i]);
+    }
+    const double all_brought = std::accumulate(brought.begin(), brought.end(), 0.0);
+    const double all_power = std::accumulate(power.begin(), power.end(), 0.0);
+    for (std::size_t i = 0; i < power.size(); ++i) {
+        const double even = power[i] / all_power;
+        const double weight = all_brought > 0.0 ? glm::mix(brought[i] / all_brought, even, power_share) : even;
+        light->m_cumulated.push_back(light->m_cumulated.back() + weight);
+    }
+    return light;
+}
+
+std::shared_ptr<const Light> MeshLight::facing_all() const
+{
+    std::shared_ptr<MeshLight> light = without_faces();
     light->m_faces = m_faces;
     light->m_cumulated = m_cumulated;
-    light->m_is_colored = m_is_colored;
     light->m_by_solid_angle = true;
     return light;
 }
@@ -113,7 +186,11 @@ void MeshLight::sample(std::span<const Vec3> points, const Vec3& normal, std::sp
         const double power = m_cumulated[index + 1] - m_cumulated[index];
         const Face& face = m_faces[index];
         const double part = std::clamp((wanted - m_cumulated[index]) / power, 0.0, 1.0);
-        const Vec3 to_middle = (face.corners[0] + face.corners[1] + face.corners[2]) / 3.0 - points[i];
+        if (shows_fronts_alone(points[i]) && shows_back(face, points[i])) {
+            rays[i] = {.travel = -normal, .distance = 1.0, .flux = Vec3f(0.0f)};
+            continue;
+        }
+        const Vec3 to_middle = middle(face) - points[i];
         if (m_by_solid_angle && glm::dot(to_middle, to_middle) < near_in_squared_sizes * face.squared_size) {
             rays[i] = near_ray(points[i], face, {part, place.y}, power / total);
             continue;
@@ -134,7 +211,10 @@ void MeshLight::sample(std::span<const Vec3> points, const Vec3& normal, std::sp
 Vec3 MeshLight::irradiance(const Vec3& point, const Vec3& normal) const
 {
     Vec3 sum(0.0);
+    const bool has_fronts_alone = shows_fronts_alone(point);
     for (const Face& face : m_faces) {
+        if (has_fronts_alone && shows_back(face, point))
+            continue;
         const auto& [a, b, c] = face.corners;
         const std::array<Vec3, 3> corners = {a - point, b - point, c - point};
         const Vec3 way = (corners[0] + corners[1] + corners[2]) / 3.0;

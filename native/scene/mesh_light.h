@@ -12,14 +12,18 @@ namespace beamspread {
 
 class MeshLight final : public Light {
 public:
-    // `vertices` in world metres; `radiance` >= 0 of each triangle, W/(m^2 sr). Copied. Throws InvalidArgument.
-    MeshLight(std::span<const Vec3> vertices, std::span<const Triangle> triangles, std::span<const Vec3f> radiance);
+    // `vertices` in world metres; `radiance` >= 0 of each triangle, W/(m^2 sr). Copied. `is_closed`: from outside of the
+    // bounds fronts hide all backs, see closed_mesh.h, so that no ray from there has to try them. Throws InvalidArgument.
+    MeshLight(std::span<const Vec3> vertices, std::span<const Triangle> triangles, std::span<const Vec3f> radiance,
+              bool is_closed);
     void sample(std::span<const Vec3> points, const Vec3& normal, std::span<const Vec2> square,
                 LightRay* rays) const override;
     Vec3 irradiance(const Vec3& point, const Vec3& normal) const override;
     double distance_from(const Vec3& point) const override;
     std::vector<LightSource> corners() const override { return box_corners(m_low, m_high); }
     bool is_colored() const override { return m_is_colored; }
+    // A copy without the faces that the rectangle can't see, whose rays go to the others by the irradiance that they bring.
+    std::shared_ptr<const Light> facing(const Vec3& normal, std::span<const Vec3> points) const override;
     // A copy whose near faces are sampled by solid angle, so that rays from points beside them have bounded flux.
     std::shared_ptr<const Light> facing_all() const override;
 
@@ -32,13 +36,25 @@ private:
     };
 
     MeshLight() = default;
+    // A copy without faces.
+    std::shared_ptr<MeshLight> without_faces() const;
+    // True if fronts hide all backs from a point.
+    bool shows_fronts_alone(const Vec3& point) const;
+    static double height_of(const Face& face, const Vec3& point, const Vec3& normal);
+    static Vec3 middle(const Face& face) { return (face.corners[0] + face.corners[1] + face.corners[2]) / 3.0; }
+    static bool shows_back(const Face& face, const Vec3& point)
+    {
+        return glm::dot(face.normal, face.corners[0] - point) >= 0.0;
+    }
     // A ray to a near face, evenly over its solid angle; `probability` is that of the face.
     static LightRay near_ray(const Vec3& point, const Face& face, const Vec2& place, double probability);
 
     Vec3 m_low{0.0}, m_high{0.0};  // bounds of the glowing faces
     std::vector<Face> m_faces;
-    std::vector<double> m_cumulated;  // sums of the faces' power, the mean of the channels; one more than faces
+    // Sums of the faces' weights, by which rays choose them; one more than faces. At first their power.
+    std::vector<double> m_cumulated;
     bool m_is_colored = false;
+    bool m_is_closed = false;
     bool m_by_solid_angle = false;
 };
 

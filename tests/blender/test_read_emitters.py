@@ -10,6 +10,7 @@ from beamspread.blender.jobs.state import state
 from beamspread.blender.node import plain
 from beamspread.blender.node.output import make_plain, plain_of
 from beamspread.blender.read.emitters import _pieces
+from beamspread.core.native import native
 from beamspread.core.scene.lights import MeshLight
 from cycles_truth import add_receiver, cycles_irradiance, read
 from mathutils import Euler, Matrix
@@ -116,6 +117,68 @@ def test_materials_of_faces():
         (0.4, 4.0, 0.8),
         (1.0, 0.5, 0.25),
     ]
+
+
+BOX = [(x, y, z) for z in (-0.3, 0.3) for y in (-0.3, 0.3) for x in (-0.3, 0.3)]
+OUTWARD = [(0, 2, 3, 1), (4, 5, 7, 6), (0, 1, 5, 4), (2, 6, 7, 3), (0, 4, 6, 2), (1, 3, 7, 5)]
+
+
+def add_box(matrix=ABOVE, faces=OUTWARD):
+    box = scenes.add_mesh("Box", BOX, faces, matrix)
+    box.data.materials.append(glowing_material()[0])
+    return box
+
+
+@pytest.mark.parametrize("mirror", [1, -1])
+def test_backs_of_a_closed_body_send_no_rays(mirror):
+    """Also where its matrix turns fronts into backs, against Cycles."""
+    add_box(ABOVE @ Matrix.Diagonal((1, mirror, 1, 1)))
+    plane, image = add_receiver(Matrix(), texels=8)
+    cycles = cycles_irradiance(plane, image, 512).mean(axis=(0, 1))
+    bpy.data.objects.remove(plane)
+    illumination = read()
+    (light,) = illumination.lights
+    assert light.is_closed
+    grid = native.ReceiverGrid((-1, -1, 0), (1, 0, 0), (0, 1, 0), (0, 0, 1), 0.25, 0.25, 8, 8)
+    alone = native.gather_rays(grid, light.native(), rays=256)[0].mean(axis=(0, 1)) * light.rgb()
+    assert alone == pytest.approx(cycles, **NOISE)
+
+
+def open_box(box):
+    box.data.clear_geometry()
+    box.data.from_pydata(BOX, [], OUTWARD[1:])
+
+
+def add_clear_slot(box):
+    nodes = Nodes(bpy.data.materials.new("Glass"), clear=True)
+    box.data.materials.append(nodes.finish(nodes.add("BsdfTransparent")))
+    box.data.polygons[0].material_index = 1
+
+
+def turn_inside_out(box):
+    box.data.flip_normals()
+
+
+def cast_no_shadow(box):
+    box.visible_shadow = False
+
+
+def instance_without_shadow(box):
+    lit = scenes.new_collection("Lit", box)
+    scenes.add_instancer(lit, Matrix.Translation((2, 0, 0))).visible_shadow = False
+
+
+SEEN_BACKS = [open_box, add_clear_slot, turn_inside_out, cast_no_shadow, instance_without_shadow]
+
+
+@pytest.mark.parametrize("change", SEEN_BACKS, ids=lambda change: change.__name__)
+def test_backs_that_are_seen_glow(change):
+    box = add_box()
+    (light,) = read().lights
+    assert light.is_closed
+    change(box)
+    (light,) = read().lights
+    assert not light.is_closed
 
 
 def test_instances_are_one_light():

@@ -7,6 +7,7 @@ from copy import copy
 import numpy as np
 
 from ...core.errors import MissingImageError, NotSupportedError
+from ...core.native import native
 from ...core.scene.lights import MeshLight
 from ...core.scene.occluders import is_within
 from ...core.scene.polygons import MAX_COORDINATE
@@ -58,6 +59,7 @@ class EmissiveMesh:
 
     def __init__(self, obj, cache: SceneCache) -> None:
         self._parts: list[tuple[np.ndarray, np.ndarray]] = []
+        self._is_closed = False
         self._matrices: list[np.ndarray] = []
         self.reason: NotSupportedError | None = None
         self.missing: list[MissingImageError] = []
@@ -73,6 +75,10 @@ class EmissiveMesh:
         mesh._matrices = []
         return mesh
 
+    def show_backs(self) -> None:
+        """Note that light leaves the mesh through its own triangles, as they do not block all of it."""
+        self._is_closed = False
+
     def add_instance(self, matrix) -> bool:
         """Add an instance at a 4 x 4 matrix; False if that is at no finite position."""
         matrix = np.array(matrix, dtype=float)
@@ -85,10 +91,11 @@ class EmissiveMesh:
         """All instances in the world as one light, or None if they are dark."""
         if not self._matrices:
             return None
-        corners = np.concatenate([corners for corners, _ in self._parts]).reshape(-1, 3)
-        vertices = np.concatenate([corners @ matrix[:3, :3].T + matrix[:3, 3] for matrix in self._matrices])
+        corners = np.concatenate([corners for corners, _ in self._parts])
+        vertices = np.concatenate([_placed(corners, matrix) for matrix in self._matrices])
         light = np.concatenate([light for _, light in self._parts] * len(self._matrices))
-        return MeshLight(*common, vertices, np.arange(len(vertices), dtype=np.uint32).reshape(-1, 3), light)
+        triangles = np.arange(len(vertices), dtype=np.uint32).reshape(-1, 3)
+        return MeshLight(*common, vertices, triangles, light, is_closed=self._is_closed)
 
     def _add(self, obj, radiance: dict, cache: SceneCache) -> None:
         mesh = obj.to_mesh()
@@ -96,6 +103,7 @@ class EmissiveMesh:
             return
         try:
             corners, uvs, slots = _triangles(mesh, len(obj.material_slots))
+            self._is_closed = _is_closed(mesh)
         finally:
             obj.to_mesh_clear()
         is_finite = (np.abs(corners) < MAX_COORDINATE).all(axis=(1, 2))
@@ -153,6 +161,22 @@ def _triangles(mesh, slot_count: int) -> tuple[np.ndarray, np.ndarray | None, np
     corners = vertex_positions.reshape(-1, 3)[vertices].reshape(-1, 3, 3).astype(float)
     visible = _visible(corners)
     return corners[visible], uvs if uvs is None else uvs[visible], np.clip(slots[visible], 0, slot_count - 1)
+
+
+def _is_closed(mesh) -> bool:
+    """True if from outside the fronts of the mesh's triangles hide their backs."""
+    triangles, vertices = np.empty(len(mesh.loop_triangles) * 3, np.int32), np.empty(len(mesh.vertices) * 3, np.float32)
+    mesh.loop_triangles.foreach_get("vertices", triangles)
+    mesh.vertices.foreach_get("co", vertices)
+    if not (np.abs(vertices) < MAX_COORDINATE).all():
+        return False
+    return native.is_closed(vertices.astype(float).reshape(-1, 3), triangles.astype(np.uint32).reshape(-1, 3))
+
+
+def _placed(corners: np.ndarray, matrix: np.ndarray) -> np.ndarray:
+    """World positions (3 N, 3) of triangles (N, 3, 3); a matrix that mirrors them leaves their fronts outside."""
+    mirrors = np.linalg.det(matrix[:3, :3]) < 0
+    return (corners[:, ::-1] if mirrors else corners).reshape(-1, 3) @ matrix[:3, :3].T + matrix[:3, 3]
 
 
 def _visible(corners: np.ndarray) -> np.ndarray:

@@ -20,6 +20,7 @@ from .lamps import fault, is_portal, read_lamp
 from .nodes import InputSocket, Links, surface_of
 from .reflection import MediumOf
 from .scene_cache import SceneCache
+from .transparency import transmittance_of
 from .visibility import left_out, left_out_of_world, render_visible_names, renders, with_instanced
 from .world_light import read_world
 
@@ -164,10 +165,21 @@ class _Lights:
         mesh = self._emissive[key]
         if mesh is None:
             return
+        if not self._blocks_light(instance):
+            mesh.show_backs()
         if mesh.lost:
             self.warn(lost_triangles(obj.name, mesh.lost))
         if not mesh.add_instance(instance.matrix_world):
             self.warn(lost_instance(obj.name))
+
+    def _blocks_light(self, instance) -> bool:
+        """True if an instance of an emissive mesh blocks all light, its own too."""
+        obj, parent = instance.object, instance.parent if instance.is_instance else None
+        blockers = self._links[obj.name].get("blockers")
+        if not casts_shadows(obj, parent) or (blockers is not None and obj.name not in blockers):
+            return False
+        materials = (slot.material for slot in obj.material_slots)
+        return all(transmittance_of(material, self._cache).transmittance.is_black for material in materials)
 
     def _emissive_mesh(self, instance, key: tuple) -> EmissiveMesh | None:
         """The mesh without its instances; None if all of its materials are dark."""

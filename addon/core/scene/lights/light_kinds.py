@@ -298,14 +298,16 @@ class MeshLight(Light):
     vertices : float64 (N, 3), world.
     triangles : uint32 (M, 3), indices of vertices.
     radiance : float32 (M, 3), W/(m^2 sr), of each triangle.
+    is_closed : True if fronts hide all backs from outside of the bounding box, as of `native.MeshLight`.
     """
 
     vertices: np.ndarray
     triangles: np.ndarray
     radiance: np.ndarray
+    is_closed: bool = False
 
     def native(self):
-        return native.MeshLight(self.vertices, self.triangles, self.radiance)
+        return native.MeshLight(self.vertices, self.triangles, self.radiance, is_closed=self.is_closed)
 
     @property
     def is_colored(self):
