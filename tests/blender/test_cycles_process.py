@@ -17,7 +17,7 @@ import pytest
 import scenes
 from beamspread.blender.cycles import cycles_light, process
 from beamspread.blender.cycles.folders import PREFIX
-from beamspread.blender.cycles.scene_copy import SceneCopy
+from beamspread.blender.cycles.scene_copy import FILE, SceneCopy
 from beamspread.core.errors import BakeError
 from beamspread.core.native import native
 from beamspread.core.progress import Progress
@@ -283,6 +283,26 @@ def test_escape_while_the_world_renders_leaves_nothing(tmp_path, monkeypatch):
         with pytest.raises(native.Cancelled):
             process.run(copy, "world", LONG | {"width": 4096, "height": 2048}, stop)
     assert [*tmp_path.iterdir()] == []
+
+
+def test_a_bake_removes_its_copy_of_the_scene_when_it_ends():
+    """Not when Python collects its garbage, which may be much later: the copy is as large as the scene."""
+    plane = add_scene()
+    node = scenes.node_of(plane.data.materials[0])
+    noise = node.id_data.nodes.new("ShaderNodeTexNoise")  # which Cycles evaluates
+    node.id_data.links.new(node.inputs["Base Color"], noise.outputs["Color"])
+    before = copies_of_scenes()
+    gc.disable()
+    try:
+        scenes.bake(plane)
+        assert process._kept._child is not None
+        assert copies_of_scenes() == before
+    finally:
+        gc.enable()
+
+
+def copies_of_scenes():
+    return sorted(folder for folder in folders(os.getpid()) if (folder / FILE).exists())
 
 
 @IS_POSIX

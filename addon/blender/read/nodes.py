@@ -202,7 +202,10 @@ class Evaluator:
         else:
             raise _MissingError(key)
         if isinstance(outcome, NotSupportedError):
-            raise outcome.with_traceback(None)
+            try:
+                raise outcome.with_traceback(None)
+            finally:
+                del outcome  # its traceback has this frame, and by it all that its callers hold
         return outcome
 
     def _evaluate(self, wanted: InputSocket, key: tuple[Source, bool]) -> np.ndarray | NotSupportedError:
@@ -222,7 +225,8 @@ class Evaluator:
                     stack[missing.key] = None
                     continue
                 except NotSupportedError as error:
-                    outcome = error
+                    outcome = error.with_traceback(None)
+                    outcome.__context__ = None
                 del stack[last]
                 self._outcomes[last] = outcome
                 self._drop_inputs(source, readers)
