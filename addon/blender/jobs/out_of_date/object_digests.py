@@ -121,8 +121,10 @@ class ObjectDigests:
         return _number(light and replace(light, name=""), reason and tree.text, self._links(obj))
 
     def _links(self, obj) -> list:
-        """Names of the objects that the object's light is linked to."""
-        links = links_of(obj, self._names).values()
+        """Names of the objects that the object's light is linked to; [] if it is linked to all."""
+        links = [*links_of(obj, self._names).values()]
+        if all(names is None for names in links):
+            return []
         return [names if names is None else sorted(names & self._names) for names in links]
 
     def _shape(self, obj) -> str:
