@@ -7,10 +7,12 @@ import numpy as np
 import pytest
 import scenes
 from beamspread.blender.images import files, waiting
+from beamspread.blender.images.shared import read_parts, within
 from beamspread.blender.jobs.run.bake_run import BakeRun
-from beamspread.blender.jobs.state import state
+from beamspread.blender.jobs.state import Status, state
 from beamspread.core.errors import ImageError
 from beamspread.core.native import native
+from beamspread.core.target import Target
 from live_scenes import live_pixels, shown_pixels, switch_off
 
 SIDE, MARGIN = 64, 8
@@ -196,6 +198,60 @@ def test_a_new_image_of_two_objects_has_margins_that_meet():
     scenes.bake(planes[0])
     assert scenes.image_of(planes[0]) == image
     assert (scenes.pixels(image)[part >= 0] > 0).all()
+
+
+def bodies_of_one_material():
+    """A box without UVs, a copy with a bevel, another object of its mesh, and a text, of one material without image."""
+    bpy.context.scene.beamspread.use_size, bpy.context.scene.beamspread.resolution = False, 128
+    material = scenes.add_material()
+    bpy.ops.mesh.primitive_cube_add(size=0.5)
+    box = bpy.context.object
+    box.data.uv_layers.remove(box.data.uv_layers[0])
+    box.data.materials.append(material)
+    beveled, twin = box.copy(), box.copy()
+    beveled.data = box.data.copy()
+    for obj in (beveled, twin):
+        bpy.context.scene.collection.objects.link(obj)
+    beveled.modifiers.new("Bevel", "BEVEL").width = 0.1
+    text = bpy.data.objects.new("Text", bpy.data.curves.new("Text", "FONT"))
+    text.data.body, text.data.extrude = "L", 0.1
+    text.data.materials.append(material)
+    bpy.context.scene.collection.objects.link(text)
+    objects = [box, beveled, twin, text]
+    for number, obj in enumerate(objects):
+        obj.location = (1.2 * number, 0, 0)
+    bpy.context.view_layer.update()
+    return objects
+
+
+def test_objects_of_one_material_get_maps_side_by_side_in_a_new_image():
+    objects = bodies_of_one_material()
+    scenes.select(*objects)
+    bpy.ops.beamspread.bake()
+    assert "\n".join(state.lines()).count("The 4 objects with the material 'Medium' lie side by side in it.") == 4
+    assert all(row.status == Status.BAKED for row in state.rows.values())
+    image = scenes.image_of(objects[0])
+    together = scenes.pixels(image)
+    assert max(image.size) == 128
+    shown = np.zeros(together.shape[:2], int)
+    for obj in objects:
+        for column, row, coverage in read_parts(Target(obj.name, "Medium"), tuple(image.size)):
+            within(shown, column, row, coverage)[...] += coverage > 0.5
+    assert shown.max() == 1
+    assert (shown > 0).mean() > 0.3
+    assert together[shown == 1][:, :3].min() > 0
+    # As alone: a bake of one of them leaves the others bit for bit.
+    scenes.bake(objects[1])
+    assert np.array_equal(scenes.pixels(image), together)
+
+
+def test_an_object_whose_material_has_an_image_gets_a_map_alone():
+    objects = bodies_of_one_material()
+    scenes.bake(objects[0])
+    scenes.select(objects[1])
+    said = scenes.messages_of(bpy.ops.beamspread.bake)
+    assert "lie side by side" not in said + "\n".join(state.lines())
+    assert "to the same part of the image" in said
 
 
 def test_overlapping_surfaces_are_named_before_and_after_the_second_bake():

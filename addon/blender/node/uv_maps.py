@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import defaultdict
 from collections.abc import Collection, Iterable, Mapping
 from dataclasses import replace
 
@@ -25,15 +26,57 @@ Outcome = Message | BakeError
 """A note about a new map, or the reason why there can be none."""
 
 
-def make_maps(depsgraph, targets: Iterable[Target]) -> dict[str, Outcome]:
+def make_maps(depsgraph, targets: Iterable[Target], fills_nodes: bool = False) -> dict[str, Outcome]:
     """Give each object without a UV map that fits into one image a map of its own; outcomes by the object's name.
 
     The other maps stay as they are, and so does the choice of the active one. Where modifiers make new faces, another
-    modifier makes the map after them.
+    modifier makes the map after them. If the results fill the nodes' images (`fills_nodes`), maps of objects that will
+    share a new image, since they have one material, lie side by side.
     """
     targets = list(targets)
     problems = problems_of(depsgraph, targets)
-    return {name: _make(depsgraph, name, targets, problem) for name, problem in problems.items()}
+    outcomes: dict[str, Outcome] = {}
+    for material, objects in _sharing(depsgraph, targets, problems).items() if fills_nodes else ():
+        make_maps_together(depsgraph, {obj: {material} for obj in objects})
+        depsgraph.update()
+        names = {obj.name for obj in objects}
+        failed = problems_of(depsgraph, [target for target in targets if target.object_name in names])
+        beside = f"The {len(objects)} objects with the material '{material}' lie side by side in it."
+        for obj in objects:
+            if obj.name not in failed:
+                outcomes[obj.name] = note(obj.name, f"{problems[obj.name]} So {_added(obj)} {beside}")
+    rest = {name: problem for name, problem in problems.items() if name not in outcomes}
+    return outcomes | {name: _make(depsgraph, name, targets, problem) for name, problem in rest.items()}
+
+
+def _sharing(depsgraph, targets: Iterable[Target], problems: Collection[str]) -> dict[str, list]:
+    """Objects whose maps have problems, by the one material that they share and that has no image yet."""
+    by_object: dict[str, dict[str, Target]] = defaultdict(dict)
+    for target in targets:
+        by_object[target.object_name][target.material_name] = target
+    sharing: dict[str, list] = defaultdict(list)
+    instances = find_instances(depsgraph, set(problems))
+    for name in problems:
+        obj, materials = instances[name].obj.original, by_object[name]
+        node = node_of(next(iter(materials.values())))
+        if len(materials) > 1 or node is None or uses_tiles(node) or node.image or node.image_back:
+            continue
+        # A map that is made after subdivisions fits one of their levels alone.
+        if not (_is_foreign(obj) or getattr(obj.data, "is_editmode", False) or _last_subdivisions(obj)):
+            sharing[next(iter(materials))].append(obj)
+    return {material: objects for material, objects in sharing.items() if len(objects) > 1}
+
+
+def _is_foreign(obj) -> bool:
+    """True if an object or its mesh belongs to another .blend file."""
+    return any(block.library or block.override_library for block in (obj, obj.data))
+
+
+def _added(obj) -> str:
+    """Sentence about the map of our own that an object has got."""
+    if find_modifier(obj) is None:
+        return f"'{obj.name}' has a new UV map '{OWN_MAP}', which its image uses."
+    return f"'{obj.name}' has a new modifier '{MODIFIER}', which makes the UV map '{OWN_MAP}' for its image."
 
 
 def problems_of(depsgraph, targets: Iterable[Target]) -> dict[str, str]:
@@ -104,7 +147,7 @@ def objects_with_maps() -> set[str]:
 def _make(depsgraph, name: str, targets: list[Target], problem: str) -> Outcome:
     obj = find_instances(depsgraph, {name})[name].obj.original
     mesh = obj.data
-    if obj.library or obj.override_library or mesh.library or mesh.override_library:
+    if _is_foreign(obj):
         text = f"{problem} '{name}' belongs to another .blend file, so it can't get a map of its own."
         return ReceiverError(
             text, "Make it local (Object > Relations > Make Local > Selected Objects, Data and Materials)."
@@ -120,7 +163,7 @@ def _make(depsgraph, name: str, targets: list[Target], problem: str) -> Outcome:
         if not _fill_layer(mesh, unwrap(polygons).astype(np.float32)):
             text = f"{problem} The mesh has as many UV maps as it can have."
             return ReceiverError(text, "Remove one of them.")
-        added = f"'{name}' has a new UV map '{OWN_MAP}', which its image uses."
+        added = _added(obj)
     else:
         set_uvs(obj, unwrap(_evaluated_polygons(depsgraph, obj)))
         depsgraph.update()
@@ -130,7 +173,7 @@ def _make(depsgraph, name: str, targets: list[Target], problem: str) -> Outcome:
                 f"{problem} Its modifiers make new faces, and these could not be unwrapped.",
                 "Apply the modifiers (Object > Apply > Visual Geometry to Mesh), and bake again.",
             )
-        added = f"'{name}' has a new modifier '{MODIFIER}', which makes the UV map '{OWN_MAP}' for its image."
+        added = _added(obj)
     return note(name, f"{problem} So {added}")
 
 
@@ -162,9 +205,7 @@ def _make_before_subdivision(depsgraph, obj, targets: list[Target]) -> str:
             obj.data.uv_layers.remove(obj.data.uv_layers[OWN_MAP])
         depsgraph.update()
         return ""
-    if is_layer:
-        return f"'{obj.name}' has a new UV map '{OWN_MAP}', which its image uses."
-    return f"'{obj.name}' has a new modifier '{MODIFIER}', which makes the UV map '{OWN_MAP}' for its image."
+    return _added(obj)
 
 
 def _last_subdivisions(obj) -> list:

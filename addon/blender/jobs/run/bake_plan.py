@@ -215,7 +215,7 @@ def read_scene(
     _update_nodes(context.evaluated_depsgraph_get())
     with as_rendered(view_layer):
         visible, depsgraph = render_visible_names(view_layer), context.evaluated_depsgraph_get()
-        maps = make_maps(depsgraph, targets)
+        maps = make_maps(depsgraph, targets, fills_nodes)
         if maps:
             depsgraph = context.evaluated_depsgraph_get()
         scene_cache.check_images()
