@@ -27,10 +27,12 @@ constexpr double golden_ratio = 0.6180339887498949;
 // Length of a piece of an edge along its row, in texels, below which the area beside it is less than a unit.
 constexpr double shortest_piece = 1e-12;
 
-// Nearest whole number of a value that is not negative. llrint would be a call of the C library at every texel.
+// Nearest whole number of a value that is not negative; a value a rounding error below a half may give 1. llrint would be
+// a call of the C library at every texel.
 std::int64_t nearest(double value)
 {
-    return static_cast<std::int64_t>(value + 0.5);
+    constexpr double half = 0.5;
+    return static_cast<std::int64_t>(value + half);
 }
 
 std::int64_t counted(double part)
