@@ -174,13 +174,13 @@ to_world : (3, 3) floats
 Parameters
 ----------
 vertices : ndarray, float64, shape (N, 3), C-contiguous
-    World positions in metres. Copied.
+    World positions in metres. Copied. Those of a closed mesh whose faces do not all glow belong to its bounding box.
 triangles : ndarray, uint32, shape (M, 3), C-contiguous
     Vertex indices. Copied.
 radiance : ndarray, float32, shape (M, 3), C-contiguous
     Radiance of each triangle, W/(m^2 sr), 0 or more. Copied.
 is_closed : bool
-    True if from outside of the triangles' bounding box fronts hide all backs: the mesh is closed (`is_closed`), blocks
+    True if from outside of the vertices' bounding box fronts hide all backs: the mesh is closed (`is_closed`), blocks
     light and is not see-through. Fronts are those from which a triangle's vertices are seen counterclockwise. Then no
     ray from there tries the backs.
 )")

@@ -38,8 +38,12 @@ MeshLight::MeshLight(std::span<const Vec3> vertices, std::span<const Triangle> t
                      std::span<const Vec3f> radiance, bool is_closed)
     : m_cumulated{0.0}, m_is_closed(is_closed)
 {
-    for (const Vec3& vertex : vertices)
+    for (const Vec3& vertex : vertices) {
         detail::check_finite("vertices", vertex);
+        const bool is_first = &vertex == vertices.data();
+        m_body_low = is_first ? vertex : glm::min(m_body_low, vertex);
+        m_body_high = is_first ? vertex : glm::max(m_body_high, vertex);
+    }
     if (radiance.size() != triangles.size())
         reject("radiance", std::to_string(radiance.size()) + " rows",
                "one for each triangle, " + std::to_string(triangles.size()));
@@ -78,7 +82,7 @@ double MeshLight::height_of(const Face& face, const Vec3& point, const Vec3& nor
 
 bool MeshLight::shows_fronts_alone(const Vec3& point) const
 {
-    return m_is_closed && glm::any(glm::lessThan(point, m_low) || glm::greaterThan(point, m_high));
+    return m_is_closed && glm::any(glm::lessThan(point, m_body_low) || glm::greaterThan(point, m_body_high));
 }
 
 double MeshLight::distance_from(const Vec3& point) const
@@ -92,6 +96,8 @@ std::shared_ptr<MeshLight> MeshLight::without_faces() const
     std::shared_ptr<MeshLight> light(new MeshLight());
     light->m_low = m_low;
     light->m_high = m_high;
+    light->m_body_low = m_body_low;
+    light->m_body_high = m_body_high;
     light->m_cumulated = {0.0};
     light->m_is_colored = m_is_colored;
     light->m_is_closed = m_is_closed;
@@ -108,7 +114,8 @@ std::shared_ptr<const Light> MeshLight::facing(const Vec3& normal, std::span<con
         high = glm::max(high, corner);
     }
     // Then no point of the rectangle lies in the bounds.
-    const bool has_fronts_alone = m_is_closed && glm::any(glm::lessThan(high, m_low) || glm::greaterThan(low, m_high));
+    const bool has_fronts_alone =
+        m_is_closed && glm::any(glm::lessThan(high, m_body_low) || glm::greaterThan(low, m_body_high));
     const auto is_hidden = [&](const Face& face) {
         return std::ranges::all_of(corners, [&](const Vec3& point) {
             return height_of(face, point, normal) <= 0.0 || (has_fronts_alone && shows_back(face, point));

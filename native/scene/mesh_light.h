@@ -13,7 +13,8 @@ namespace beamspread {
 class MeshLight final : public Light {
 public:
     // `vertices` in world metres; `radiance` >= 0 of each triangle, W/(m^2 sr). Copied. `is_closed`: from outside of the
-    // bounds fronts hide all backs, see closed_mesh.h, so that no ray from there has to try them. Throws InvalidArgument.
+    // bounds of all vertices fronts hide all backs, see closed_mesh.h, so that no ray from there has to try them. Throws
+    // InvalidArgument.
     MeshLight(std::span<const Vec3> vertices, std::span<const Triangle> triangles, std::span<const Vec3f> radiance,
               bool is_closed);
     void sample(std::span<const Vec3> points, const Vec3& normal, std::span<const Vec2> square,
@@ -49,7 +50,8 @@ private:
     // A ray to a near face, evenly over its solid angle; `probability` is that of the face.
     static LightRay near_ray(const Vec3& point, const Face& face, const Vec2& place, double probability);
 
-    Vec3 m_low{0.0}, m_high{0.0};  // bounds of the glowing faces
+    Vec3 m_low{0.0}, m_high{0.0};            // bounds of the glowing faces
+    Vec3 m_body_low{0.0}, m_body_high{0.0};  // bounds of all vertices
     std::vector<Face> m_faces;
     // Sums of the faces' weights, by which rays choose them; one more than faces. At first their power.
     std::vector<double> m_cumulated;

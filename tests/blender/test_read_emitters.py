@@ -144,6 +144,20 @@ def test_backs_of_a_closed_body_send_no_rays(mirror):
     assert alone == pytest.approx(cycles, **NOISE)
 
 
+def test_a_room_whose_ceiling_glows_lights_its_floor():
+    """Seen from within are the backs of a closed body, also of one whose faces do not all glow."""
+    room = add_box(Matrix.Translation((0, 0, 0.5)) @ Matrix.Diagonal((4, 4, 3, 1)))
+    room.data.materials.append(bpy.data.materials.new("Dark"))
+    for number, polygon in enumerate(room.data.polygons):
+        polygon.material_index = number != 1  # the upper one
+    (light,) = read().lights
+    assert light.is_closed
+    assert len(light.triangles) == 2
+    grid = native.ReceiverGrid((-1, -1, 0), (1, 0, 0), (0, 1, 0), (0, 0, 1), 0.25, 0.25, 8, 8)
+    inside = native.gather_rays(grid, light.native(), rays=256)[0].mean(axis=(0, 1)) * light.rgb()
+    assert inside == pytest.approx(irradiance(light), rel=0.01)
+
+
 def open_box(box):
     box.data.clear_geometry()
     box.data.from_pydata(BOX, [], OUTWARD[1:])

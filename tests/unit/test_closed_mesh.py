@@ -165,6 +165,19 @@ def test_a_plane_through_the_lamp_sees_its_inside():
     assert found[:, :15].mean() == pytest.approx(beside[:, :15].mean(), rel=2e-3)
 
 
+def test_faces_that_do_not_glow_close_a_mesh():
+    """A room whose ceiling alone glows: its backs light the floor, and nothing outside."""
+    vertices, triangles = np.ascontiguousarray(CUBE[0], float), CUBE[1]
+    ceiling = triangles[(vertices[triangles][..., 2] == 1).all(axis=1)]
+    glow = np.ones((len(ceiling), 3), np.float32)
+    closed, open_light = (native.MeshLight(vertices, ceiling, glow, is_closed=value) for value in (True, False))
+    assert irradiance(closed, (0.2, 0.1, -0.5), UP) == irradiance(open_light, (0.2, 0.1, -0.5), UP)
+    assert irradiance(closed, (0.2, 0.1, -1.5), UP) == (0, 0, 0)
+    floor = native.ReceiverGrid(**make_grid(8, size=(1.0, 1.0), centre=(0, 0, -0.9)))
+    found, expected = (native.gather_rays(floor, light, rays=256)[0] for light in (closed, open_light))
+    np.testing.assert_allclose(found, expected, rtol=1e-6)
+
+
 @pytest.mark.parametrize("closed", [False, True])
 def test_rays_choose_faces_by_the_light_that_they_bring(closed):
     """A bright lamp at the other end of a hall takes few rays from a dim one near the floor: its noise is low."""

@@ -59,7 +59,7 @@ class EmissiveMesh:
 
     def __init__(self, obj, cache: SceneCache) -> None:
         self._parts: list[tuple[np.ndarray, np.ndarray]] = []
-        self._is_closed = False
+        self._is_closed, self._bounds = False, np.zeros((1, 0, 3))
         self._matrices: list[np.ndarray] = []
         self.reason: NotSupportedError | None = None
         self.missing: list[MissingImageError] = []
@@ -95,6 +95,8 @@ class EmissiveMesh:
         vertices = np.concatenate([_placed(corners, matrix) for matrix in self._matrices])
         light = np.concatenate([light for _, light in self._parts] * len(self._matrices))
         triangles = np.arange(len(vertices), dtype=np.uint32).reshape(-1, 3)
+        if self._is_closed:  # faces that do not glow close the mesh, too
+            vertices = np.concatenate([vertices, *(_placed(self._bounds, matrix) for matrix in self._matrices)])
         return MeshLight(*common, vertices, triangles, light, is_closed=self._is_closed)
 
     def _add(self, obj, radiance: dict, cache: SceneCache) -> None:
@@ -111,6 +113,9 @@ class EmissiveMesh:
         if self.lost:
             corners, slots, uvs = corners[is_finite], slots[is_finite], None if uvs is None else uvs[is_finite]
         self._reach = float(np.abs(corners).max(initial=0.0))
+        if self._is_closed:
+            low, high = corners.min(axis=(0, 1)), corners.max(axis=(0, 1))
+            self._bounds = np.stack(np.meshgrid(*zip(low, high)), axis=-1).reshape(1, 8, 3)
         for index, light in radiance.items():
             chosen = slots == index
             if not chosen.any():
@@ -174,7 +179,7 @@ def _is_closed(mesh) -> bool:
 
 
 def _placed(corners: np.ndarray, matrix: np.ndarray) -> np.ndarray:
-    """World positions (3 N, 3) of triangles (N, 3, 3); a matrix that mirrors them leaves their fronts outside."""
+    """World positions (N, 3) of groups of corners (M, K, 3); a matrix that mirrors triangles leaves fronts outside."""
     mirrors = np.linalg.det(matrix[:3, :3]) < 0
     return (corners[:, ::-1] if mirrors else corners).reshape(-1, 3) @ matrix[:3, :3].T + matrix[:3, 3]
 

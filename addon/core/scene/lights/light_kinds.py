@@ -295,10 +295,10 @@ class MeshLight(Light):
 
     Attributes
     ----------
-    vertices : float64 (N, 3), world.
+    vertices : float64 (N, 3), world; those of no triangle belong to the bounding box of a closed mesh.
     triangles : uint32 (M, 3), indices of vertices.
     radiance : float32 (M, 3), W/(m^2 sr), of each triangle.
-    is_closed : True if fronts hide all backs from outside of the bounding box, as of `native.MeshLight`.
+    is_closed : True if fronts hide all backs from outside of that box, as of `native.MeshLight`.
     """
 
     vertices: np.ndarray
