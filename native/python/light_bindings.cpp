@@ -1,5 +1,6 @@
 // Python names of the lights in native/scene.
 #include <memory>
+#include <optional>
 #include <vector>
 
 #include "base/constants.h"
@@ -67,12 +68,15 @@ std::unique_ptr<MeshLight> make_mesh_light(const py::array& vertices, const py::
                                        is_closed);
 }
 
-bool is_closed_mesh(const py::array& vertices, const py::array& triangles)
+bool is_closed_mesh(const py::array& vertices, const py::array& triangles, const std::optional<py::array>& glowing)
 {
     const auto corners = to_vertices(vertices);
     const auto faces = to_triangles(triangles);
+    std::optional<std::span<const std::uint32_t>> starts;
+    if (glowing)
+        starts = to_rows<std::uint32_t, std::uint32_t>("glowing", *glowing, "contiguous uint32 (K, 1)");
     const py::gil_scoped_release released;
-    return is_closed(corners, faces);
+    return is_closed(corners, faces, starts);
 }
 
 }  // namespace
@@ -187,22 +191,24 @@ is_closed : bool
         .def(py::init(&make_mesh_light), py::arg("vertices"), py::arg("triangles"), py::arg("radiance"),
              py::arg("is_closed") = false);
 
-    m.def("is_closed", &is_closed_mesh, py::arg("vertices"), py::arg("triangles"),
+    m.def("is_closed", &is_closed_mesh, py::arg("vertices"), py::arg("triangles"), py::arg("glowing") = py::none(),
           R"(True if from outside a mesh the fronts of its triangles hide their backs.
 
-The mesh has no border, no triangle lies on another, and rays from 4096 places on the backs all meet it again; parts
-of less than a thousandth of the area that are inside out may be missed. Vertices at the same position count as one.
+The mesh has no border, no triangle lies on another, and rays from 4096 places on backs all meet it again; of their
+area, parts of less than two thousandths that are inside out may be missed. Vertices at the same position count as one.
 
 Parameters
 ----------
 vertices : ndarray, float64, shape (N, 3), C-contiguous
 triangles : ndarray, uint32, shape (M, 3), C-contiguous
     Vertex indices.
+glowing : ndarray, uint32, shape (K, 1), C-contiguous, or None
+    Indices of the triangles from whose backs rays start; None: all.
 
 Raises
 ------
 ValueError
-    Wrong dtype or shape, an index beyond the vertices.
+    Wrong dtype or shape, a position that is not finite, an index out of range.
 )");
 }
 

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <cstdint>
 #include <numeric>
+#include <optional>
 #include <tuple>
 #include <utility>
 #include <vector>
@@ -75,16 +76,19 @@ bool has_doubles(std::span<const Triangle> triangles)
     return std::ranges::adjacent_find(corners) != corners.end();
 }
 
-// True if rays from the backs of triangles meet the mesh.
-bool hides_backs(std::span<const Vec3> vertices, std::span<const Triangle> triangles)
+// True if rays from the backs of some of the triangles meet the mesh.
+bool hides_backs(std::span<const Vec3> vertices, std::span<const Triangle> triangles, std::span<const Triangle> starts)
 {
     Vec3 low = vertices[triangles[0][0]];
     Vec3 high = low;
+    for (const Triangle& triangle : triangles)
+        for (const std::uint32_t vertex : triangle) {
+            low = glm::min(low, vertices[vertex]);
+            high = glm::max(high, vertices[vertex]);
+        }
     std::vector<double> areas = {0.0};
-    for (const Triangle& triangle : triangles) {
+    for (const Triangle& triangle : starts) {
         const auto& [a, b, c] = std::array{vertices[triangle[0]], vertices[triangle[1]], vertices[triangle[2]]};
-        low = glm::min(low, glm::min(a, glm::min(b, c)));
-        high = glm::max(high, glm::max(a, glm::max(b, c)));
         areas.push_back(areas.back() + glm::length(glm::cross(b - a, c - a)));
     }
     const double extent = glm::length(high - low);
@@ -105,7 +109,7 @@ bool hides_backs(std::span<const Vec3> vertices, std::span<const Triangle> trian
             const double wanted = place.x * areas.back();
             const auto above = std::upper_bound(areas.begin() + 1, areas.end() - 1, wanted);
             const auto index = static_cast<std::size_t>(above - areas.begin()) - 1;
-            const auto& [p, q, r] = triangles[index];
+            const auto& [p, q, r] = starts[index];
             const double part = std::clamp((wanted - areas[index]) / (areas[index + 1] - areas[index]), 0.0, 1.0);
             const double root = std::sqrt(part);
             const Vec3 edge = vertices[q] - vertices[p];
@@ -128,22 +132,31 @@ bool hides_backs(std::span<const Vec3> vertices, std::span<const Triangle> trian
 
 }  // namespace
 
-bool is_closed(std::span<const Vec3> vertices, std::span<const Triangle> triangles)
+bool is_closed(std::span<const Vec3> vertices, std::span<const Triangle> triangles,
+               std::optional<std::span<const std::uint32_t>> glowing)
 {
     for (const Vec3& vertex : vertices)
         detail::check_finite("vertices", vertex);
     const std::vector<std::uint32_t> first = welded(vertices);
-    std::vector<Triangle> solid;
-    for (const Triangle& triangle : triangles) {
+    std::vector<bool> glows(triangles.size(), !glowing);
+    for (const std::uint32_t triangle : glowing.value_or(std::span<const std::uint32_t>{})) {
+        detail::check_index("glowing", triangle, "triangles", triangles.size());
+        glows[triangle] = true;
+    }
+    std::vector<Triangle> solid, starts;
+    for (std::size_t i = 0; i < triangles.size(); ++i) {
         Triangle same;
         for (std::size_t k = 0; k < 3; ++k) {
-            detail::check_index("triangles", triangle[k], "vertices", vertices.size());
-            same[k] = first[triangle[k]];
+            detail::check_index("triangles", triangles[i][k], "vertices", vertices.size());
+            same[k] = first[triangles[i][k]];
         }
-        if (has_area(same))
-            solid.push_back(same);
+        if (!has_area(same))
+            continue;
+        solid.push_back(same);
+        if (glows[i])
+            starts.push_back(same);
     }
-    return !solid.empty() && has_no_border(solid) && !has_doubles(solid) && hides_backs(vertices, solid);
+    return !solid.empty() && has_no_border(solid) && !has_doubles(solid) && hides_backs(vertices, solid, starts);
 }
 
 }  // namespace beamspread

@@ -25,6 +25,11 @@ constexpr double sizes_to_small = 20.0 * 20.0;
 // noise little: over the face irradiance then hardly changes.
 constexpr double near_in_squared_sizes = 4.0;
 
+// Margin of a closed mesh's bounds, in their sizes and in the distance from the origin: points of its own walls lie within,
+// where backs are tried, too. Single precision rounds them by 1e-7.
+constexpr double bounds_margin = 1e-3;
+constexpr double far_margin = 1e-5;
+
 // Part of the rays that choose faces by their power, so that none is left out where it matters, between the points at which
 // irradiance is known. More: more rays that bring little.
 constexpr double power_share = 0.1;
@@ -44,6 +49,10 @@ MeshLight::MeshLight(std::span<const Vec3> vertices, std::span<const Triangle> t
         m_body_low = is_first ? vertex : glm::min(m_body_low, vertex);
         m_body_high = is_first ? vertex : glm::max(m_body_high, vertex);
     }
+    const Vec3 margin =
+        bounds_margin * (m_body_high - m_body_low) + far_margin * glm::max(glm::abs(m_body_low), glm::abs(m_body_high));
+    m_body_low -= margin;
+    m_body_high += margin;
     if (radiance.size() != triangles.size())
         reject("radiance", std::to_string(radiance.size()) + " rows",
                "one for each triangle, " + std::to_string(triangles.size()));
@@ -87,7 +96,13 @@ bool MeshLight::shows_fronts_alone(const Vec3& point) const
 
 double MeshLight::distance_from(const Vec3& point) const
 {
-    return glm::distance(point, glm::clamp(point, m_low, m_high));
+    const double to_glow = glm::distance(point, glm::clamp(point, m_low, m_high));
+    if (!m_is_closed)
+        return to_glow;
+    // At the body's bounds backs begin to count.
+    const double to_bounds = glm::distance(point, glm::clamp(point, m_body_low, m_body_high));
+    const Vec3 to_sides = glm::min(point - m_body_low, m_body_high - point);
+    return std::min(to_glow, std::max(to_bounds, std::min({to_sides.x, to_sides.y, to_sides.z})));
 }
 
 std::shared_ptr<MeshLight> MeshLight::without_faces() const

@@ -51,7 +51,7 @@ private:
     static LightRay near_ray(const Vec3& point, const Face& face, const Vec2& place, double probability);
 
     Vec3 m_low{0.0}, m_high{0.0};            // bounds of the glowing faces
-    Vec3 m_body_low{0.0}, m_body_high{0.0};  // bounds of all vertices
+    Vec3 m_body_low{0.0}, m_body_high{0.0};  // bounds of all vertices, with a margin
     std::vector<Face> m_faces;
     // Sums of the faces' weights, by which rays choose them; one more than faces. At first their power.
     std::vector<double> m_cumulated;

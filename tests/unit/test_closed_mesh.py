@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from _native_test import irradiance, sample
 from beamspread.core.native import native
+from beamspread.core.scene.lights import STRATA
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -72,6 +73,16 @@ def test_bodies_are_closed(name):
 @pytest.mark.parametrize("name", OTHERS)
 def test_others_are_not(name):
     assert not is_closed(*OTHERS[name])
+
+
+def test_only_backs_that_glow_have_to_be_hidden():
+    """A lamp that is inside out is found, however large the dark rest of the mesh is."""
+    vertices, triangles = joined(box((-10, -10, -1), (10, 10, 0)), moved((CUBE[0], CUBE[1][:, ::-1]), (0, 0, 1), 0.05))
+    dark, lamp = np.arange(24, dtype=np.uint32).reshape(2, 12, 1)
+    assert native.is_closed(vertices, triangles, dark)
+    assert not native.is_closed(vertices, triangles, lamp)
+    with pytest.raises(ValueError, match="glowing"):
+        native.is_closed(vertices, triangles, lamp + np.uint32(1))
 
 
 @given(st.integers(0, 2**31), st.integers(4, 12))
@@ -176,6 +187,56 @@ def test_faces_that_do_not_glow_close_a_mesh():
     floor = native.ReceiverGrid(**make_grid(8, size=(1.0, 1.0), centre=(0, 0, -0.9)))
     found, expected = (native.gather_rays(floor, light, rays=256)[0] for light in (closed, open_light))
     np.testing.assert_allclose(found, expected, rtol=1e-6)
+
+
+ROOM = box((-1.4, -0.7, 0.3), (1.6, 2.3, 2.8))
+
+
+def ceilings():
+    """The ceiling of the room as a light of both sides, and as one of a closed mesh."""
+    vertices, triangles = np.ascontiguousarray(ROOM[0]), ROOM[1]
+    ceiling = triangles[(vertices[triangles][..., 2] == vertices[:, 2].max()).all(axis=1)]
+    glow = np.ones((len(ceiling), 3), np.float32)
+    return [native.MeshLight(vertices, ceiling, glow, is_closed=value) for value in (False, True)]
+
+
+def test_light_bounces_in_a_room_whose_ceiling_glows():
+    """Its walls are the bounds of the closed mesh; single precision moves points on them to either side."""
+    white = native.Reflector(native.ColorTexture((0.8,) * 3))
+    scene = native.Occluders([native.OccluderMesh(*ROOM, reflectors=[white])])
+    floor = {
+        "corner": (-0.4, 0.3, 0.301),
+        "x_axis": (1.0, 0.0, 0.0),
+        "y_axis": (0.0, 1.0, 0.0),
+        "normal": (0.0, 0.0, 1.0),
+        "size": (1.0, 1.0),
+        "nodes": (8, 8),
+    }
+    options = {"direct": 1.0, "max_bounces": 20, "max_samples": 256, "tolerance": 4e-3}
+    both, closed = (
+        native.bounced_light([floor], STRATA, [(light, (1.0,) * 3, scene)], scene, **options) for light in ceilings()
+    )
+    noise = 3 * np.hypot(both["noise"], closed["noise"]) * (1 + both["irradiance"])
+    assert closed["irradiance"] == pytest.approx(both["irradiance"], abs=noise)
+
+
+@pytest.mark.parametrize("beyond", [0.0, 1e-12, -1e-12])
+def test_a_receiver_on_the_room_s_own_wall_sees_its_ceiling(beyond):
+    """From inside, also where rounding sets it beside the wall."""
+    axes = np.array([(0.0, 1.0, 0.0), (0.0, 0.0, 1.0), (1.0, 0.0, 0.0)])
+    grid = native.ReceiverGrid(**make_grid(8, size=(1.0, 1.0), axes=axes, centre=(-1.4 - beyond, 0.8, 1.5)))
+    both, closed = (native.gather_rays(grid, light, rays=256)[0] for light in ceilings())
+    assert both.min() > 0.1
+    np.testing.assert_allclose(closed, both, rtol=1e-6)
+
+
+def test_a_floor_through_the_walls_of_a_room():
+    """Direct light in texels beside the bounds, where backs begin to count, is that of both sides with shadows."""
+    grid = native.ReceiverGrid(**make_grid(200, size=(4.0, 4.0), centre=(0.1, 0.8, 0.4)))
+    casters = occluders(ROOM)
+    both, closed = (native.gather_rays(grid, light, casters, rays=256, even_rays=16)[0] for light in ceilings())
+    assert closed.mean() == pytest.approx(both.mean(), rel=2e-3)
+    np.testing.assert_allclose(blocks(closed), blocks(both), rtol=0.02, atol=2e-3 * both.max())
 
 
 @pytest.mark.parametrize("closed", [False, True])

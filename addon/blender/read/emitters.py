@@ -85,6 +85,7 @@ class EmissiveMesh:
         is_finite = is_within(matrix, self._reach)
         if self._parts and is_finite:
             self._matrices.append(matrix)
+            self._is_closed &= not _is_flat(matrix)
         return is_finite
 
     def light(self, common: tuple) -> MeshLight | None:
@@ -105,7 +106,7 @@ class EmissiveMesh:
             return
         try:
             corners, uvs, slots = _triangles(mesh, len(obj.material_slots))
-            self._is_closed = _is_closed(mesh)
+            self._is_closed = _is_closed(mesh, len(obj.material_slots), list(radiance))
         finally:
             obj.to_mesh_clear()
         is_finite = (np.abs(corners) < MAX_COORDINATE).all(axis=(1, 2))
@@ -168,14 +169,25 @@ def _triangles(mesh, slot_count: int) -> tuple[np.ndarray, np.ndarray | None, np
     return corners[visible], uvs if uvs is None else uvs[visible], np.clip(slots[visible], 0, slot_count - 1)
 
 
-def _is_closed(mesh) -> bool:
-    """True if from outside the fronts of the mesh's triangles hide their backs."""
-    triangles, vertices = np.empty(len(mesh.loop_triangles) * 3, np.int32), np.empty(len(mesh.vertices) * 3, np.float32)
+def _is_closed(mesh, slot_count: int, glowing: list[int]) -> bool:
+    """True if from outside the fronts of the mesh's triangles hide their backs; `glowing`: slots that emit light."""
+    count = len(mesh.loop_triangles)
+    triangles, slots = np.empty(count * 3, np.int32), np.empty(count, np.int32)
+    vertices = np.empty(len(mesh.vertices) * 3, np.float32)
     mesh.loop_triangles.foreach_get("vertices", triangles)
+    mesh.loop_triangles.foreach_get("material_index", slots)
     mesh.vertices.foreach_get("co", vertices)
     if not (np.abs(vertices) < MAX_COORDINATE).all():
         return False
-    return native.is_closed(vertices.astype(float).reshape(-1, 3), triangles.astype(np.uint32).reshape(-1, 3))
+    starts = np.flatnonzero(np.isin(np.clip(slots, 0, slot_count - 1), glowing)).astype(np.uint32)
+    triangles = triangles.astype(np.uint32).reshape(-1, 3)
+    return native.is_closed(vertices.astype(float).reshape(-1, 3), triangles, starts.reshape(-1, 1))
+
+
+def _is_flat(matrix: np.ndarray) -> bool:
+    """True if rounding decides whether a matrix mirrors."""
+    axes = matrix[:3, :3]
+    return bool(abs(np.linalg.det(axes)) <= 1e-9 * np.prod(np.linalg.norm(axes, axis=0)))
 
 
 def _placed(corners: np.ndarray, matrix: np.ndarray) -> np.ndarray:
