@@ -245,6 +245,30 @@ def test_objects_of_one_material_get_maps_side_by_side_in_a_new_image():
     assert np.array_equal(scenes.pixels(image), together)
 
 
+def test_an_object_that_comes_later_has_a_place_once_the_image_is_new():
+    """Beside an image it is refused, with the way out; for a new one the maps of earlier bakes are made anew."""
+    *first, last = bodies_of_one_material()[:3]
+    scenes.select(*first)
+    bpy.ops.beamspread.bake()
+    scenes.select(last)
+    assert "make One Atlas for the Selection" in scenes.messages_of(bpy.ops.beamspread.bake)
+    scenes.node_of(first[0].data.materials[0]).image = None
+    scenes.select(*first, last)
+    bpy.ops.beamspread.bake()
+    assert "\n".join(state.lines()).count("The 3 objects with the material 'Medium' lie side by side in it.") == 3
+    assert all(row.status == Status.BAKED for row in state.rows.values())
+
+
+def test_faces_of_other_materials_keep_an_object_from_maps_side_by_side():
+    """A later bake of these would move them all."""
+    box, beveled, *_ = bodies_of_one_material()
+    beveled.data.materials.append(bpy.data.materials.new("Plain"))
+    beveled.data.polygons[0].material_index = 1
+    scenes.select(box, beveled)
+    assert "to the same part of the image" in scenes.messages_of(bpy.ops.beamspread.bake)
+    assert "side by side" not in "\n".join(state.lines())
+
+
 def test_an_object_whose_material_has_an_image_gets_a_map_alone():
     objects = bodies_of_one_material()
     scenes.bake(objects[0])

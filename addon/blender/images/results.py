@@ -16,6 +16,7 @@ from ...core.target import Target
 from ..node import plain
 from ..node.find import find_node, node_of, uses_tiles
 from ..node.node import image_of_side, link_result
+from ..node.uv_maps import objects_with_maps
 from ..read.geometry import read_polygons
 from . import files, icons, tiled
 from .facts import note_bake, owners_of, users_of, users_of_material
@@ -254,7 +255,7 @@ def own_material(name: str) -> str:
 
 def _own_place(name: str) -> str:
     """The end of a sentence on how an object gets a place of its own in an image."""
-    if _shares_mesh(name):  # and its UVs
+    if _shares_mesh(name) or name in objects_with_maps():  # the UVs of others, or of our own
         return "make One Atlas for the Selection (Properties > Render > Beamspread > New Images)"
     return "move its UVs"
 

@@ -40,31 +40,45 @@ def make_maps(depsgraph, targets: Iterable[Target], fills_nodes: bool = False) -
         make_maps_together(depsgraph, {obj: {material} for obj in objects})
         depsgraph.update()
         names = {obj.name for obj in objects}
-        failed = problems_of(depsgraph, [target for target in targets if target.object_name in names])
-        beside = f"The {len(objects)} objects with the material '{material}' lie side by side in it."
+        names -= set(problems_of(depsgraph, [target for target in targets if target.object_name in names]))
+        beside = f"The {len(names)} objects with the material '{material}' lie side by side in it."
         for obj in objects:
-            if obj.name not in failed:
-                outcomes[obj.name] = note(obj.name, f"{problems[obj.name]} So {_added(obj)} {beside}")
+            if obj.name in names:
+                problem = problems.get(obj.name, "The image is new.")
+                outcomes[obj.name] = note(obj.name, f"{problem} So {_added(obj)} {beside}")
     rest = {name: problem for name, problem in problems.items() if name not in outcomes}
     return outcomes | {name: _make(depsgraph, name, targets, problem) for name, problem in rest.items()}
 
 
 def _sharing(depsgraph, targets: Iterable[Target], problems: Collection[str]) -> dict[str, list]:
-    """Objects whose maps have problems, by the one material that they share and that has no image yet."""
+    """Objects of one material that has no image yet, by that material, if bakes make or have made their maps."""
     by_object: dict[str, dict[str, Target]] = defaultdict(dict)
     for target in targets:
         by_object[target.object_name][target.material_name] = target
     sharing: dict[str, list] = defaultdict(list)
-    instances = find_instances(depsgraph, set(problems))
-    for name in problems:
-        obj, materials = instances[name].obj.original, by_object[name]
-        node = node_of(next(iter(materials.values())))
-        if len(materials) > 1 or node is None or uses_tiles(node) or node.image or node.image_back:
+    for name, instance in find_instances(depsgraph, set(by_object)).items():
+        obj, (material, *others) = instance.obj.original, by_object[name]
+        node = node_of(by_object[name][material])
+        if others or obj.type not in RECEIVER_TYPES or not (name in problems or _has_own_map(obj)):
+            continue
+        if node is None or node.uv_map or uses_tiles(node) or node.image or node.image_back:
+            continue
+        if _is_foreign(obj) or getattr(obj.data, "is_editmode", False) or not _is_of(depsgraph, obj, material):
             continue
         # A map that is made after subdivisions fits one of their levels alone.
-        if not (_is_foreign(obj) or getattr(obj.data, "is_editmode", False) or _last_subdivisions(obj)):
-            sharing[next(iter(materials))].append(obj)
+        if not _last_subdivisions(obj):
+            sharing[material].append(obj)
     return {material: objects for material, objects in sharing.items() if len(objects) > 1}
+
+
+def _is_of(depsgraph, obj, material: str) -> bool:
+    """True if all faces of an object, after its modifiers, carry the material."""
+    evaluated = obj.evaluated_get(depsgraph)
+    try:
+        mesh = evaluated.to_mesh()
+        return len(faces_with(evaluated, mesh, {material})) == len(mesh.polygons)
+    finally:
+        evaluated.to_mesh_clear()
 
 
 def _is_foreign(obj) -> bool:
@@ -140,8 +154,11 @@ def _users(mesh) -> int:
 
 def objects_with_maps() -> set[str]:
     """Names of all objects that have a map of our own, or the modifier that makes it."""
-    objects = (obj for obj in bpy.data.objects if obj.type in RECEIVER_TYPES)
-    return {obj.name for obj in objects if OWN_MAP in getattr(obj.data, "uv_layers", ()) or find_modifier(obj)}
+    return {obj.name for obj in bpy.data.objects if obj.type in RECEIVER_TYPES and _has_own_map(obj)}
+
+
+def _has_own_map(obj) -> bool:
+    return OWN_MAP in getattr(obj.data, "uv_layers", ()) or find_modifier(obj) is not None
 
 
 def _make(depsgraph, name: str, targets: list[Target], problem: str) -> Outcome:

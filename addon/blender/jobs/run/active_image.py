@@ -188,6 +188,11 @@ class BEAMSPREAD_OT_bake_active(bpy.types.Operator):
         return {"CANCELLED"} if "CANCELLED" in bpy.ops.object.bake(how) else {"FINISHED"}
 
 
+def _is_stored(image) -> bool:
+    """True if a file, or the .blend file, has an image's pixels."""
+    return bool(image.packed_files) or Path(bpy.path.abspath(image.filepath, library=image.library)).is_file()
+
+
 class _Saved:
     """Pixels of images that Blender's own operator clears while it runs without ours, as from its search menu.
 
@@ -207,7 +212,7 @@ class _Saved:
         for image in {*refused, *others}:
             if 0 in image.size or is_tiled(image):
                 continue
-            is_packed = not image.is_dirty and image.source != "GENERATED"
+            is_packed = not image.is_dirty and image.source != "GENERATED" and _is_stored(image)
             if is_packed:
                 self._packed.add(image.name)
             if image in refused or not is_packed:
@@ -227,7 +232,7 @@ class _Saved:
             return False
         if not bpy.context.scene.render.bake.use_clear:
             self._take_pixels(image)
-        elif image.packed_files or Path(bpy.path.abspath(image.filepath, library=image.library)).is_file():
+        elif _is_stored(image):
             self._packed.add(image.name)
         else:
             return False
