@@ -105,8 +105,10 @@ void LightSearch::visit_around(std::size_t tile, const Visit& visit) const
 std::vector<LightHit> LightSearch::hits_around(std::size_t tile) const
 {
     std::vector<LightHit> hits = m_tiles[tile].hits;
-    const Vec2f center = static_cast<float>(tile_side) * Vec2f(static_cast<float>(tile % m_columns) + 0.5f,
-                                                               static_cast<float>(tile / m_columns) + 0.5f);
+    const std::size_t column = tile % m_columns;
+    const std::size_t row = tile / m_columns;
+    const Vec2f center =
+        static_cast<float>(tile_side) * Vec2f(static_cast<float>(column) + 0.5f, static_cast<float>(row) + 0.5f);
     const auto distance = [&center](const LightHit& hit) {
         const Vec2f step = glm::abs(hit.position - center);
         return std::max(step.x, step.y);
