@@ -33,29 +33,12 @@ constexpr int max_trials = 64;
 constexpr Vec2 step_on_light(0.8566748838545029, 0.7338918566271259);
 constexpr Vec2 step_in_texel(0.6287067210378086, 0.5385972572236101);
 
-// Points evenly on a plane, its corners first.
-std::vector<Vec3> points_on(const ReceiverGrid& grid)
-{
-    constexpr std::size_t side = 5;
-    const auto at = [&](std::size_t column, std::size_t row) {
-        const auto place = [](std::size_t i, std::size_t texels) {
-            return static_cast<double>(i * texels) / static_cast<double>(side - 1);
-        };
-        return grid.point(place(column, grid.width), place(row, grid.height));
-    };
-    std::vector<Vec3> points = {at(0, 0), at(side - 1, 0), at(0, side - 1), at(side - 1, side - 1)};
-    for (std::size_t i = 0; i < side * side; ++i)
-        if ((i % side) % (side - 1) != 0 || (i / side) % (side - 1) != 0)
-            points.push_back(at(i % side, i / side));
-    return points;
-}
-
 // Rays of one light with a size, from the texels of one grid.
 class SizedGatherer {
 public:
     SizedGatherer(const ReceiverGrid& grid, const Light& light, const Occluders* occluders, const RaySettings& settings)
         : m_grid(grid),
-          m_prepared(grid.is_bent() ? light.facing_all() : light.facing(grid.normal, points_on(grid))),
+          m_prepared(grid.is_bent() ? light.facing_all() : light.facing(grid.normal, grid.points())),
           m_light(m_prepared ? *m_prepared : light),
           m_open(grid, m_light, settings.at_centers),
           m_occluders(occluders),

@@ -62,6 +62,22 @@ Vec3 ReceiverGrid::bent_point(double x, double y) const
     return bent_texel(texel).point(x - static_cast<double>(texel % width), y - static_cast<double>(texel / width));
 }
 
+std::vector<Vec3> ReceiverGrid::points() const
+{
+    constexpr std::size_t last = 4;  // along each side
+    const auto place = [](std::size_t i, std::size_t texels) {
+        return static_cast<double>(i * texels) / static_cast<double>(last);
+    };
+    std::vector<Vec3> corners, others;
+    for (std::size_t row = 0; row <= last; ++row)
+        for (std::size_t column = 0; column <= last; ++column) {
+            const bool is_corner = column % last == 0 && row % last == 0;
+            (is_corner ? corners : others).push_back(point(place(column, width), place(row, height)));
+        }
+    corners.insert(corners.end(), others.begin(), others.end());
+    return corners;
+}
+
 double ReceiverGrid::reach(const Vec3& center) const
 {
     if (is_bent()) {

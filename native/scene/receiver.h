@@ -53,6 +53,9 @@ struct ReceiverGrid {
     // The world position at x and y in texels.
     Vec3 point(double x, double y) const { return is_bent() ? bent_point(x, y) : origin + step(x, y); }
 
+    // Some points evenly on a plane, its four corners first.
+    std::vector<Vec3> points() const;
+
     // The shading normal of a texel; 0 outside of a mesh that bends.
     Vec3 normal_at(std::size_t texel) const { return is_bent() ? Vec3(bent_texel(texel).normal) : normal; }
 

@@ -240,7 +240,7 @@ def test_objects_of_one_material_get_maps_side_by_side_in_a_new_image():
     assert shown.max() == 1
     assert (shown > 0).mean() > 0.3
     assert together[shown == 1][:, :3].min() > 0
-    # As alone: a bake of one of them leaves the others bit for bit.
+    # A bake of one of them leaves the others bit for bit.
     scenes.bake(objects[1])
     assert np.array_equal(scenes.pixels(image), together)
 
