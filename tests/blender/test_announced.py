@@ -6,6 +6,7 @@ import beamspread
 import bmesh
 import bpy
 import pytest
+from beamspread.blender import compat
 from beamspread.blender.jobs.announced import line_of, simulation_line
 from beamspread.blender.jobs.out_of_date import stale
 from beamspread.blender.jobs.run.bake_plan import prepare_scene, read_scene
@@ -177,6 +178,63 @@ def test_few_rays_find_about_as_much_bounced_light_as_the_bake(gray, radius):
         means.append(float(bake.texture.mean()))
     part = 1 - means[1] / means[0]
     assert part / 1.3 < announced_part < 1.3 * part
+
+
+def light_below_a_pane(material):
+    """Surroundings that the panel finds for a plane below a pane of a material, all of whose sun comes through it."""
+    (name,) = find_targets([plane()])
+    pane = add_plane("Pane", (40.0, 40.0), Matrix.Translation((0, 0, 1.0)))
+    pane.data.materials.append(material)
+    add_sun(strength=2.0).data.angle = 0.1
+    stale.refresh(bpy.context)
+    return state.announced[name].around
+
+
+def test_light_of_lamps_through_glass_is_found_by_paths_that_meet_them():
+    """Of a path's directions the sun fills its form factor, the squared sine of half its angle."""
+    nodes = Nodes(bpy.data.materials.new("Glass"), clear=True)
+    around = light_below_a_pane(nodes.finish(nodes.add("BsdfGlass", {})))
+    met = 0.05**2
+    assert (around.lit, around.returned[0]) == (0, 1)
+    assert around.met == pytest.approx(met, rel=1e-2)
+    assert around.spikes == pytest.approx(1 / met, rel=1e-2)
+
+
+def test_a_pane_that_is_not_clear_blocks_lamps():
+    around = light_below_a_pane(diffuse_material((0.5, 0.5, 0.5)))
+    assert (around.lit, around.met, around.spikes) == (0, 0, 0)
+
+
+def test_materials_without_nodes_return_their_color():
+    """Blender 5 has none: there it stands for a diffuse surface of .8."""
+    scene = bpy.context.scene
+    scene.beamspread.use_indirect = True
+    (name,) = find_targets([plane()])
+    card = add_plane("Card", (1.0, 2.0), Matrix.Translation((0.5, 0, 0.5)))
+    add_lamp((0, 0, 0.3))
+    material = bpy.data.materials.new("Plain")
+    card.data.materials.append(material)
+    parts = []
+    for value in (0.8, 0.1):
+        material.diffuse_color = (value, value, value, 1)
+        if compat.uses_nodes(material):
+            Nodes(material, clear=True).finish(Nodes(material).add("BsdfDiffuse", {"Color": material.diffuse_color}))
+        stale.refresh(bpy.context)
+        mean = state.announced[name].around.returned[0]
+        parts.append(mean / (1 - mean))
+    assert parts[0] > 6 * parts[1] > 0
+
+
+def test_light_on_both_faces_of_a_slab_counts_together():
+    """A lamp below it, beside a wall: its upper face sees nothing."""
+    bpy.context.scene.beamspread.use_indirect = True
+    target = plane(thickness=0.01)
+    card = add_plane("Card", (1.0, 2.0), Matrix.Translation((0.5, 0, -0.5)))
+    card.data.materials.append(diffuse_material((0.8, 0.8, 0.8)))
+    add_lamp((-0.5, 0, -0.3))
+    stale.refresh(bpy.context)
+    (name,) = find_targets([target])
+    assert state.announced[name].around.returned[0] > 0.01
 
 
 def test_rays_are_announced_where_obstacles_are_alone():

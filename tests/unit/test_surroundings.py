@@ -6,6 +6,7 @@ from beamspread.core.bake.surroundings import (
     OPEN,
     Surroundings,
     bounced_seconds,
+    bounced_seconds_of_cycles,
     corners_of,
     directions_of,
     enclosed_part,
@@ -81,14 +82,14 @@ def test_directions_are_spread_as_even_light():
     assert directions_of(None).mean(axis=0) == pytest.approx(0, abs=NOISE)
 
 
-def seconds(triangles=1000, around=OPEN, is_bent=False, nodes=NODES):
-    return bounced_seconds(triangles, around, nodes, is_bent, 1, MAX_RAYS)
+def seconds(triangles=1000, around=OPEN, is_bent=False, nodes=NODES, spread=0.0):
+    return bounced_seconds(triangles, around, nodes, is_bent, 1, MAX_RAYS, spread)
 
 
 def test_rooms_take_longer_up_to_the_largest_number_of_rays():
     room, dim = Surroundings(0.5, 1.0), Surroundings(1.0, 0.0)
     assert seconds() < seconds(around=room) < seconds(around=dim)
-    assert seconds(around=dim) < seconds(around=dim, nodes=2 * NODES) == seconds(around=dim, nodes=4 * NODES)
+    assert seconds(around=dim, nodes=NODES / 4) < seconds(around=dim) == seconds(around=dim, nodes=4 * NODES)
     # 12 million rays in rooms of 5 thousand to 280 thousand triangles took 20 to 30 seconds of a core.
     assert 15 < seconds(5000, dim) < seconds(280_000, dim) < 35
 
@@ -109,3 +110,21 @@ def test_light_that_few_directions_bring_takes_longer():
     assert seconds(around=bright) == seconds(around=brighter)  # paths are guided there
     assert even.bounced_in_cycles == pytest.approx(0.9)
     assert 0.9 < spotty.bounced_in_cycles < 1.2
+
+
+def test_a_medium_that_spreads_light_over_nodes_needs_fewer_paths():
+    room = Surroundings(0.5, 0.5)
+    assert seconds(around=room, spread=4.0) < seconds(around=room, spread=1.0) < seconds(around=room)
+
+
+def test_lamps_through_glass_take_cycles_long_where_its_paths_meet_them():
+    """A sun shows as noise only once a path has met it."""
+    times = [
+        bounced_seconds_of_cycles(Surroundings(0.5, 0.5, (0.1, 0.1), *glass), NODES, False)
+        for glass in ((0.0, 0.0), (100.0, 1e-8), (100.0, 2e-6), (100.0, 1e-3))
+    ]
+    plain, unseen, seldom, often = times
+    assert unseen == pytest.approx(plain, rel=0.3)
+    assert 2 * plain < seldom < 0.9 * often
+    # 128 paths of each part; a core traces some 250,000 to 300,000 a second in the open.
+    assert often == pytest.approx(bounced_seconds_of_cycles(Surroundings(0.5, 0.5, (2.0, 2.0)), NODES, False))

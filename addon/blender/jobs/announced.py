@@ -27,7 +27,7 @@ from ..read.lights import lights_surfaces
 from ..read.node_kinds import NodeKinds, all_known, kinds_of
 from ..read.scene_cache import scene_cache
 from ..read.visibility import SURFACE_TYPES, by_name, placed, render_visible_names
-from .rays import Look, Tracer, places_for
+from .rays import CLEAR, Look, Tracer, places_for
 from .state import Announced, state
 from .target_shape import Shape, grid_of, grid_of_bent, shape_of
 
@@ -44,6 +44,8 @@ MAX_LINES = 4
 
 # Reflectance of materials whose color is not one value, and irradiance of emission of the same kind, W/m^2, about.
 REFLECTANCE, GLOW = 0.5, 5.0
+# Reflectance of surfaces without a material.
+DEFAULT_REFLECTANCE = 0.8
 
 # Largest numbers of triangles and of objects among which rays are traced. More keep the window waiting.
 MAX_TRACED, MAX_TRACED_OBJECTS = 300_000, 500
@@ -164,8 +166,8 @@ class _SceneFacts:
         if self.triangles <= MAX_TRACED and len(self._boxes) <= MAX_TRACED_OBJECTS:
             side = 1.0 if target.side == FRONT else -1.0
             has_unknown_sky = self.world_by_cycles or self.unknown == OF_WORLD
-            around = self._tracer.around(target.obj, side, has_unknown_sky)
             sides = (side, -side) if target.node.surface().thickness > 0 else (side,)
+            around = self._tracer.around(target.obj, sides, has_unknown_sky)
             shares = tuple(self._tracer.shares(target.obj, one, has_unknown_sky) for one in sides)
             return replace(around, shares=shares)
         obj = target.obj
@@ -219,17 +221,27 @@ def _look_of(obj) -> Look:
     looks = [
         scene_cache.get(("look", item), [item, item.node_tree], lambda item=item: _look(item)) for item in materials
     ]
-    return tuple(np.mean(looks, axis=0).tolist()) if looks else (REFLECTANCE, 0.0)
+    return Look(*np.mean(looks, axis=0).tolist()) if looks else Look(DEFAULT_REFLECTANCE)
 
 
 def _look(material) -> Look:
+    if not compat.uses_nodes(material):
+        return Look(float(np.clip(material.diffuse_color[:3], 0.0, 1.0).mean()))
     kinds = _kinds(material)
     glow = 0.0 if not kinds.glows else GLOW if kinds.color is None else np.pi * float(np.mean(kinds.color))
-    nodes = material.node_tree.nodes if compat.uses_nodes(material) else ()
-    sockets = [node.inputs.get("Base Color") or node.inputs.get("Color") for node in nodes if "Bsdf" in node.bl_idname]
+    closures = [node for node in material.node_tree.nodes if "Bsdf" in node.bl_idname]
+    sockets = [node.inputs.get("Base Color") or node.inputs.get("Color") for node in closures]
     plain = [float(np.mean(item.default_value[:3])) for item in sockets if item is not None and not item.is_linked]
     is_plain = plain and len(plain) == len(sockets)
-    return (float(np.mean(plain)) if is_plain else REFLECTANCE) * (kinds.color is None), glow
+    clear = float(np.mean([*map(_is_glass, closures)])) if closures else 0.0
+    return Look((float(np.mean(plain)) if is_plain else REFLECTANCE) * (kinds.color is None), glow, clear)
+
+
+def _is_glass(node) -> bool:
+    """True if a closure lets most light through."""
+    share = node.inputs.get("Transmission Weight") or node.inputs.get("Transmission")
+    is_clear = share is not None and (share.is_linked or share.default_value > CLEAR)
+    return is_clear or node.bl_idname in ("ShaderNodeBsdfGlass", "ShaderNodeBsdfRefraction")
 
 
 def _is_valid(target: BakeTarget) -> bool:

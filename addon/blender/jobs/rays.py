@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
+from typing import NamedTuple
 
 import numpy as np
 from mathutils import Vector
@@ -39,11 +40,44 @@ MAX_CROSSINGS = 16
 # Length of a ray without an end; Blender takes single precision.
 FAR = 1e9
 
-# Light that arrives after two or more bounces over that which arrives after two, about.
-LATER_BOUNCES = 1.5
+# Part of the light that a surface returns which meets a surface again, where two bounces did, about.
+STAYING = 0.66
 
-Look = tuple[float, float]
-"""Reflectance of an object's materials, and the irradiance of even light of their radiance, W/m^2, about."""
+# Part of an object's closures, and of a closure's light, from which on they count as glass.
+CLEAR = 0.5
+
+
+class Look(NamedTuple):
+    """Look of an object's materials to rays, about.
+
+    Attributes
+    ----------
+    reflectance : of even light.
+    glow : irradiance of even light of their radiance, W/m^2.
+    clear : part of them that is glass.
+    """
+
+    reflectance: float
+    glow: float = 0.0
+    clear: float = 0.0
+
+
+class LampLight(NamedTuple):
+    """Irradiance of lamps at a place, W/m^2.
+
+    Attributes
+    ----------
+    arriving, open : with shadows and without.
+    through_glass : which arrives through glass, where only paths that meet the lamp bring it.
+    spikes : mean square of the light on such paths.
+    met : part of all paths which they are.
+    """
+
+    arriving: float
+    open: float
+    through_glass: float
+    spikes: float
+    met: float
 
 
 class Tracer:
@@ -62,34 +96,41 @@ class Tracer:
         self._looks: dict[str, Look] = {}
         self._random = np.random.default_rng(1)
 
-    def around(self, obj, side: float, has_unknown_sky: bool) -> Surroundings:
-        """Surroundings of the faces of an object; `side`: -1 for the faces' backs, else 1.
+    def around(self, obj, sides: Sequence[float], has_unknown_sky: bool) -> Surroundings:
+        """Surroundings of the faces of an object; `sides`: 1 for the faces, -1 for their backs.
 
         `has_unknown_sky`: True if the sky gives light of a strength that is not known: it counts as much as the lamps.
         """
-        places, normals = self._places_on(obj.evaluated_get(self._depsgraph), side, self._places)
+        evaluated = obj.evaluated_get(self._depsgraph)
+        places, normals = self._places_on_sides(evaluated, sides, self._places)
         if not len(places):
             return Surroundings()
-        more = self._places_on(obj.evaluated_get(self._depsgraph), side, MORE_PLACES * self._places)
-        arriving, open_light = np.array([self._of_lamps(*at) for at in zip(*more)]).T
+        more = self._places_on_sides(evaluated, sides, MORE_PLACES * self._places)
+        arriving, open_light, through_glass, spikes, met = np.array([self._of_lamps(*at) for at in zip(*more)]).T
         sky = self._sky + has_unknown_sky * (float(open_light.mean()) or 1.0)
         count = len(places) * DIRECTIONS
-        direct, bounced = float(arriving.mean()), []
+        direct, bounced, spiky, meeting = float(arriving.mean()), [], float(spikes.mean()), float(met.mean())
         for turn, (place, normal) in enumerate(zip(places, normals)):
             for direction in directions_of(normal, DIRECTIONS, turn):
-                hit = self._hit(place, direction)
-                if hit is None:
+                hit, crossed = self._hit(place, direction)
+                if hit is None and crossed:
+                    bounced.append(sky)
+                elif hit is None:
                     direct += sky / count
-                    continue
-                reflectance, glow = hit[2]
-                direct += glow / count
-                bounced.append(reflectance * self._irradiance(*hit[:2], sky))
-        everything = direct + sum(bounced) / count
-        mean, square = sum(bounced) / count, sum(value * value for value in bounced) / count
-        returned = (mean / everything, math.sqrt(square) / everything) if everything > 0 else (0.0, 0.0)
+                else:
+                    look = hit[2]
+                    direct += look.glow / count
+                    irradiance, spikes_there, met_there = self._irradiance(*hit[:2], sky)
+                    bounced.append(look.reflectance * irradiance)
+                    spiky += look.reflectance**2 * spikes_there / count
+                    meeting += met_there / count
+        bounced = _without_outlier(bounced)
+        found = sum(bounced) / count + float(through_glass.mean())
+        everything, square = direct + found, sum(value * value for value in bounced) / count
+        scale = 1.0 / everything if everything > 0 else 0.0
         enclosed = len(bounced) / count
         lit = float(arriving.sum() / open_light.sum()) if open_light.any() else 1.0 - enclosed
-        return Surroundings(enclosed, lit, returned)
+        return Surroundings(enclosed, lit, (scale * found, scale * math.sqrt(square)), scale**2 * spiky, meeting)
 
     def shares(self, obj, side: float, has_unknown_sky: bool) -> dict[str, float]:
         """Share of the rays to each light of a size that a bake traces beyond the first ones, by the light's name.
@@ -126,61 +167,99 @@ class Tracer:
                 blocked += weight * self._is_blocked(start, ray, distance)
         return blocked / arriving if arriving else None
 
-    def _irradiance(self, point: np.ndarray, normal: np.ndarray, sky: float) -> float:
-        """Irradiance of a surface that a ray has met: of lamps, and from one direction of the hemisphere."""
-        turn, number = self._random.uniform(0, 2 * math.pi), self._random.integers(DIRECTIONS)
-        hit, direct = (
-            self._hit(point, directions_of(normal, DIRECTIONS, turn)[number]),
-            self._of_lamps(point, normal)[0],
-        )
-        if hit is None:
-            return direct + sky
-        there, facing, (reflectance, glow) = hit
-        return direct + glow + LATER_BOUNCES * reflectance * self._of_lamps(there, facing)[0]
+    def _irradiance(self, point: np.ndarray, normal: np.ndarray, sky: float) -> tuple[float, float, float]:
+        """Irradiance of a surface that a ray has met, of lamps and from one direction of the hemisphere.
 
-    def _of_lamps(self, point: np.ndarray, normal: np.ndarray) -> tuple[float, float]:
-        """Irradiance of lamps, with shadows and without."""
+        And `spikes` and `met` of its `LampLight`.
+        """
+        turn, number = self._random.uniform(0, 2 * math.pi), self._random.integers(DIRECTIONS)
+        hit, _ = self._hit(point, directions_of(normal, DIRECTIONS, turn)[number])
+        lamps = self._of_lamps(point, normal)
+        direct = lamps.arriving + lamps.through_glass
+        if hit is None:
+            return direct + sky, lamps.spikes, lamps.met
+        there, facing, look = hit
+        later = look.reflectance / (1.0 - STAYING * min(look.reflectance, 1.0))
+        return direct + look.glow + later * self._of_lamps(there, facing).arriving, lamps.spikes, lamps.met
+
+    def _of_lamps(self, point: np.ndarray, normal: np.ndarray) -> LampLight:
+        """Irradiance of lamps at a place."""
         lamps, factor = self._lamps, 1.0
         if len(lamps) > MAX_LAMPS:
             numbers = self._random.choice(len(lamps), MAX_LAMPS, replace=False)
             lamps, factor = [lamps[number] for number in numbers], len(lamps) / MAX_LAMPS
-        arriving = open_light = 0.0
+        total = np.zeros(5)
         for lamp in lamps:
             irradiance, direction, distance = _from_lamp(lamp, point, normal)
-            if irradiance > 0:
-                open_light += factor * irradiance
-                is_lit = not lamp.cast_shadow or not self._is_blocked(point, direction, distance)
-                arriving += factor * irradiance * is_lit
-        return arriving, open_light
+            if irradiance <= 0:
+                continue
+            blocker = self._blocker(point, direction, distance, _casts_no_shadow) if lamp.cast_shadow else None
+            through_glass = spikes = seen = 0.0
+            if blocker is not None and self._is_glass(blocker):
+                met = _part_that_meets(lamp, direction, distance, normal)
+                if met > 0 and self._blocker(point, direction, distance, self._lets_through) is None:
+                    through_glass, spikes, seen = irradiance, irradiance**2 / met, met
+            total += irradiance * (blocker is None), irradiance, through_glass, spikes, seen
+        return LampLight(*(factor * total).tolist())
 
-    def _hit(self, start: np.ndarray, direction: np.ndarray) -> tuple[np.ndarray, np.ndarray, Look] | None:
-        """Point slightly above what a ray meets, its normal towards the ray's start, and its look."""
-        is_hit, point, normal, _, obj, _ = self._cast(start, direction)
-        if not is_hit:
-            return None
-        normal = np.array(normal)
-        if normal @ direction > 0:
-            normal = -normal
-        lift = LIFT_OF_HIT * float(np.linalg.norm(np.array(point) - start))
+    def _hit(
+        self, start: np.ndarray, direction: np.ndarray
+    ) -> tuple[tuple[np.ndarray, np.ndarray, Look] | None, bool]:
+        """What a ray meets behind glass: a point slightly above it, its normal towards the start, and its look.
+
+        And whether the ray has crossed glass.
+        """
+        origin, crossed = start, False
+        for _ in range(MAX_CROSSINGS):
+            is_hit, point, normal, _, obj, _ = self._cast(origin, direction)
+            if not is_hit:
+                return None, crossed
+            point, normal = np.array(point), np.array(normal)
+            lift = LIFT_OF_HIT * float(np.linalg.norm(point - start))
+            if not self._is_glass(obj):
+                normal = -normal if normal @ direction > 0 else normal
+                return (point + lift * normal, normal, self._look(obj)), crossed
+            origin, crossed = point + lift * direction, True
+        return None, crossed
+
+    def _look(self, obj) -> Look:
         if obj.name not in self._looks:
             self._looks[obj.name] = self._look_of(obj)
-        return np.array(point) + lift * normal, normal, self._looks[obj.name]
+        return self._looks[obj.name]
+
+    def _is_glass(self, obj) -> bool:
+        return self._look(obj).clear > CLEAR
+
+    def _lets_through(self, obj) -> bool:
+        return _casts_no_shadow(obj) or self._is_glass(obj)
 
     def _is_blocked(self, start, direction, distance: float) -> bool:
         """True if an object that casts shadows stands in the way."""
+        return self._blocker(start, direction, distance, _casts_no_shadow) is not None
+
+    def _blocker(self, start, direction, distance: float, passes: Callable[[object], bool]):
+        """The first object in the way that lets no light through; None if there is none."""
         for _ in range(MAX_CROSSINGS):
             is_hit, point, _, _, obj, _ = self._cast(start, direction, distance)
-            if not is_hit or obj.visible_shadow:
-                return is_hit
+            if not is_hit:
+                return None
+            if not passes(obj):
+                return obj
             passed = (1 + LIFT_OF_HIT) * (point - Vector(start)).length
             start, distance = Vector(start) + passed * Vector(direction), distance - passed
             if distance <= 0:
-                return False
-        return True
+                return None
+        return obj
 
     def _cast(self, start, direction, distance: float = FAR) -> tuple:
         scene = self._depsgraph.scene
         return scene.ray_cast(self._depsgraph, Vector(start), Vector(direction), distance=distance)
+
+    def _places_on_sides(self, obj, sides: Sequence[float], count: int) -> tuple[np.ndarray, np.ndarray]:
+        """`_places_on` for each of the sides, which share the number of places."""
+        found = [self._places_on(obj, side, max(count // len(sides), 1)) for side in sides]
+        places, normals = zip(*found)
+        return np.concatenate(places), np.concatenate(normals)
 
     def _places_on(self, obj, side: float, count: int) -> tuple[np.ndarray, np.ndarray]:
         """About `count` places (N, 3) a little above some faces of an evaluated object, and the normals there.
@@ -211,6 +290,16 @@ class Tracer:
                 places.append(matrix[:3, :3] @ point + matrix[:3, 3] + lift * normal)
                 normals.append(normal)
         return np.array(places), np.array(normals)
+
+
+def _without_outlier(values: list[float]) -> list[float]:
+    """Values whose largest is no larger than the second: by few rays, one of them may tell more than all others."""
+    second = sorted(values)[-2] if len(values) > 1 else 0.0
+    return [min(value, second) for value in values]
+
+
+def _casts_no_shadow(obj) -> bool:
+    return not obj.visible_shadow
 
 
 def _spread_over(corners: np.ndarray, center: np.ndarray, count: int) -> np.ndarray:
@@ -288,3 +377,16 @@ def _from_lamp(lamp: Light, point: np.ndarray, normal: np.ndarray) -> tuple[floa
         is_inside = direction @ axis >= math.cos(0.5 * lamp.spot_size) * (float(np.linalg.norm(axis)) or 1.0)
         falloff *= bool(is_inside)
     return strength / (4 * math.pi) * falloff, direction, distance
+
+
+def _part_that_meets(lamp: Light, direction: np.ndarray, distance: float, normal: np.ndarray) -> float:
+    """Part of the paths from a diffuse surface that meet a lamp: the form factor, about."""
+    if hasattr(lamp, "direction"):
+        square = math.tan(0.5 * min(lamp.angle, math.pi / 2)) ** 2
+    elif isinstance(lamp, AreaLight):
+        axis = np.array(lamp.frame[2])
+        facing = abs(float(direction @ axis)) / (float(np.linalg.norm(axis)) or 1.0)
+        square = facing * lamp.size_x * lamp.size_y * (0.25 if lamp.is_round else 1 / math.pi) / distance**2
+    else:
+        square = (lamp.radius / distance) ** 2
+    return min(square * max(float(direction @ normal), 0.0), 1.0)

@@ -14,11 +14,14 @@ from ..progress import Progress
 from ..scene.bent_grid import AnyGrid, BentGrid
 from ..scene.grid import Grid
 from ..scene.lights import STRATA, BentField, Field, FieldLight
+from .bake_settings import BakeSettings
 from .job import BakeJob, Step
 from .layers import WITHOUT_MEDIUM
 from .mean_light import SHADOW_TEXELS, mean_irradiance, mean_open_irradiance
 from .smoothing import SPLINE_VARIANCE, smoothing_variance
-from .surroundings import bounced_seconds
+from .spread import spread_lengths
+from .surface import Surface
+from .surroundings import SPREADS, bounced_seconds
 
 # Nodes along the longest side of a receiver, and the root of their number on a mesh that bends; more resolve bounced
 # light more finely and take longer.
@@ -73,8 +76,9 @@ class BouncedLight(Step):
 
     def seconds(self, job: BakeJob) -> float:
         triangles, nodes = job.illumination.triangle_count, node_count(job.lit_grids, self.nodes)
+        spread = spread_in_nodes(job.surface, job.settings, job.grids, job.receiver.is_bent, self.nodes)
         seconds = bounced_seconds(
-            triangles, job.surroundings, nodes, job.receiver.is_bent, job.settings.threads, self.max_rays
+            triangles, job.surroundings, nodes, job.receiver.is_bent, job.settings.threads, self.max_rays, spread
         )
         return seconds * (BARE_TIME if _is_bare(job) else 1.0)
 
@@ -137,6 +141,17 @@ def _spread(job: BakeJob) -> float:
     grids = [chart.grid for chart in job.receiver.charts]
     pitch = max(max(grid.width * grid.pitch_x, grid.height * grid.pitch_y) for grid in grids) / NODES
     return max(math.sqrt(math.pi * max(variance, 0.0)) * pitch, min(job.surface.material.mean_free_path))
+
+
+def spread_in_nodes(
+    surface: Surface, settings: BakeSettings, grids: Sequence[AnyGrid], is_bent: bool, nodes: int = NODES
+) -> float:
+    """About what `_spread` finds with the medium's library, in distances of nodes; `nodes` as in `node_count`."""
+    if settings.layer in WITHOUT_MEDIUM:
+        return 0.0
+    sizes = [(grid.width * grid.pitch_x, grid.height * grid.pitch_y) for grid in grids]
+    cell = math.sqrt(sum(x * y for x, y in sizes)) / nodes if is_bent else _sizes_and_cell(grids, nodes)[1]
+    return SPREADS * min(spread_lengths(surface)) / cell
 
 
 def mean_over(grids: Sequence[AnyGrid], value_of: Callable[[AnyGrid], float]) -> float:

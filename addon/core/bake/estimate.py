@@ -73,7 +73,7 @@ SPREAD_BOUNCED, SPREAD_BOUNCED_TEXEL = 0.15, 0.65e-6
 # Seconds until Cycles has started, and of each triangle; of the light of a lamp, of bounced light, of a panorama of the
 # world, and of a base color for each texel.
 CYCLES_START, CYCLES_TRIANGLE = 1.5, 5e-6
-CYCLES_LAMP, CYCLES_BOUNCED, CYCLES_WORLD, CYCLES_COLOR = 3.0, 4.0, 6.0, 5e-6
+CYCLES_LAMP, CYCLES_BOUNCED, CYCLES_WORLD, CYCLES_COLOR = 3.0, 2.0, 6.0, 5e-6
 
 # Fraction of the light that comes from a world, or from glowing meshes, whose light is not known, about.
 OF_WORLD, OF_MESHES = 0.5, 0.1

@@ -9,7 +9,7 @@ from ..ldf.library import SIMULATING
 from ..scene.bent_grid import AnyGrid
 from ..scene.lights import Light
 from .bake_settings import BakeSettings
-from .bounced import MAX_RAYS, NODES, BouncedLight, node_count
+from .bounced import MAX_RAYS, NODES, BouncedLight, node_count, spread_in_nodes
 from .estimate import (
     CYCLES_COLORS,
     CYCLES_LIGHT,
@@ -95,7 +95,8 @@ class Forecast:
             lights = finders.world, finders.lamps, seconds
             steps.append((CYCLES_LIGHT, cycles_light_seconds(*lights, self.triangles)))
         if bounced and finders.is_own:
-            seconds = bounced_seconds(self.triangles, finders.around, nodes, self.is_bent, threads, MAX_RAYS)
+            facts = self.triangles, finders.around, nodes, self.is_bent, threads, MAX_RAYS
+            seconds = bounced_seconds(*facts, spread_in_nodes(self.surface, settings, self.grids, self.is_bent))
             steps.append((BouncedLight.name, seconds))
         unknown = max(self.unknown, OF_WORLD * finders.world)
         shares = [finders.around.shares_on(side) for side in range(2)]

@@ -22,15 +22,20 @@ LEARNING, OPEN_RAY, ROOM_RAY = 0.2, (0.36e-6, 0.07e-6), (0.2e-6, 0.035e-6)
 OPEN_PATH, ROOM_PATH = 1.0, 1.7
 
 # Paths of each part of the hemisphere at a node that bring the noise of light that is all bounced to one percent, on
-# planes and on surfaces that bend; and the fewest that are traced.
-PATHS, BENT_PATHS, MIN_PATHS = 16.0, 8.0, 2.0
+# planes and on surfaces that bend, where no medium spreads it; and the fewest and the most that are traced.
+PATHS, BENT_PATHS, PATH_LIMITS = 100.0, 65.0, (2.0, 128.0)
 # Part of even light's square that counts as noise, beside the squares of the differences between directions; and the
 # largest noise: paths are guided to spots that are brighter.
 EVEN_NOISE, MOST_NOISE = 0.2, 1.4
+# Half the side of a square whose mean has as much noise as light after the medium's spread, in spreads of the channel
+# that spreads least, about.
+SPREADS = 1.2
 
 # The same of paths by Cycles, which nothing guides: on planes, where a filter helps, and on bent surfaces; the fewest
-# and the most; and seconds of one thread for each.
-CYCLES_PATHS, CYCLES_BENT_PATHS, CYCLES_LIMITS, CYCLES_PATH = 50.0, 200.0, (4.0, 128.0), 4e-6
+# # and the most.
+CYCLES_PATHS, CYCLES_BENT_PATHS, CYCLES_LIMITS = 50.0, 200.0, (4.0, 128.0)
+# Seconds of one thread for each in the open, and more of them in closed rooms, where paths bounce this often, about.
+CYCLES_PATH, CYCLES_BOUNCES = (3e-6, 7e-6), 4
 
 # Bounced light in a closed room over the light of lamps without obstacles, about.
 BOUNCED_PART = 0.4
@@ -57,12 +62,16 @@ class Surroundings:
     lit : part of the lamps' light that nothing blocks.
     returned : mean and root mean square of bounced light over directions, relative to the mean of all light; None if
         they are not known.
+    spikes : mean square of the light of lamps that paths meet through glass, relative to the square of all light.
+    met : part of the paths that meet one.
     shares : `Shares` of the receiver, and of its other face if light there counts.
     """
 
     enclosed: float = 0.0
     lit: float = 1.0
     returned: tuple[float, float] | None = None
+    spikes: float = 0.0
+    met: float = 0.0
     shares: tuple[Shares, ...] = field(default=(), compare=False)
 
     @property
@@ -75,7 +84,7 @@ class Surroundings:
 
     @property
     def bounced_in_cycles(self) -> float:
-        """The same for light by Cycles, whose filter removes part of the noise of bright directions."""
+        """The same for light by Cycles, whose filter removes part of the noise of bright directions; without `spikes`."""
         return self._bounced_part() if self.returned is None else math.sqrt(math.prod(self.returned))
 
     def _bounced_part(self) -> float:
@@ -94,10 +103,21 @@ OPEN = Surroundings()
 
 
 def bounced_seconds(
-    triangles: int, around: Surroundings, nodes: float, is_bent: bool, threads: int, max_rays: float
+    triangles: int,
+    around: Surroundings,
+    nodes: float,
+    is_bent: bool,
+    threads: int,
+    max_rays: float,
+    spread: float = 0.0,
 ) -> float:
-    """Seconds in which our own rays find bounced light at so many nodes."""
-    paths = nodes * len(STRATA) * max((BENT_PATHS if is_bent else PATHS) * around.bounced**2, MIN_PATHS)
+    """Seconds in which our own rays find bounced light at so many nodes.
+
+    `spread`: half the side of a square whose mean has as much noise as light after the medium's spread, in nodes.
+    """
+    least, most = PATH_LIMITS
+    wanted = (BENT_PATHS if is_bent else PATHS) * around.bounced**2 / (1.0 + spread**2)
+    paths = nodes * len(STRATA) * min(max(wanted, least), most)
     rays = min(paths * (OPEN_PATH + ROOM_PATH * around.enclosed), max_rays)
     doublings = math.log2(1 + triangles)
     ray = sum(
@@ -108,9 +128,19 @@ def bounced_seconds(
 
 def bounced_seconds_of_cycles(around: Surroundings, nodes: float, is_bent: bool) -> float:
     """Seconds in which Cycles finds bounced light at so many nodes, besides its start."""
+    noise = around.bounced_in_cycles**2
+    plain, spiky = (_paths_of_cycles(square, is_bent) for square in (noise, noise + around.spikes))
+    # Light that no path of the first round meets does not show as noise.
+    missed = math.exp(-CYCLES_LIMITS[0] * nodes * len(STRATA) * around.met)
+    paths = missed * plain + (1.0 - missed) * spiky
+    fixed, more = CYCLES_PATH
+    return parallel_seconds((fixed + more * around.enclosed**CYCLES_BOUNCES) * paths * nodes * len(STRATA), 0)
+
+
+def _paths_of_cycles(noise: float, is_bent: bool) -> float:
+    """Paths by Cycles of each part of the hemisphere at a node; `noise`: square of that of one path."""
     least, most = CYCLES_LIMITS
-    paths = min(max((CYCLES_BENT_PATHS if is_bent else CYCLES_PATHS) * around.bounced_in_cycles**2, least), most)
-    return parallel_seconds(CYCLES_PATH * paths * nodes * len(STRATA), 0)
+    return min(max((CYCLES_BENT_PATHS if is_bent else CYCLES_PATHS) * noise, least), most)
 
 
 def surroundings_of(
