@@ -202,9 +202,7 @@ class Tracer:
             total += irradiance * (blocker is None), irradiance, through_glass, spikes, seen
         return LampLight(*(factor * total).tolist())
 
-    def _hit(
-        self, start: np.ndarray, direction: np.ndarray
-    ) -> tuple[tuple[np.ndarray, np.ndarray, Look] | None, bool]:
+    def _hit(self, start: np.ndarray, direction: np.ndarray) -> tuple[tuple[np.ndarray, np.ndarray, Look] | None, bool]:
         """What a ray meets behind glass: a point slightly above it, its normal towards the start, and its look.
 
         And whether the ray has crossed glass.

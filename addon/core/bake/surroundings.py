@@ -84,7 +84,7 @@ class Surroundings:
 
     @property
     def bounced_in_cycles(self) -> float:
-        """The same for light by Cycles, whose filter removes part of the noise of bright directions; without `spikes`."""
+        """The same for light by Cycles, whose filter removes part of the noise of bright directions; no `spikes`."""
         return self._bounced_part() if self.returned is None else math.sqrt(math.prod(self.returned))
 
     def _bounced_part(self) -> float:
