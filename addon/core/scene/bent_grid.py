@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 
@@ -82,7 +83,7 @@ class BentGrid:
 
     pitch_y = pitch_x
 
-    @property
+    @cached_property
     def pieces(self) -> float:
         """Mean number of pieces into which the solver divides a texel."""
         return pieces_of_texels(self.steps_x, self.steps_y, self.areas)
@@ -102,15 +103,19 @@ class BentGrid:
     @property
     def centre(self) -> np.ndarray:
         """Middle of the box around the surface."""
-        return self.corners().mean(axis=0)
+        return self._box.mean(axis=0)
 
     @property
     def size(self) -> float:
         """Longest side of the box around the surface."""
-        return float(np.ptp(self.corners(), axis=0).max())
+        return float(np.ptp(self._box, axis=0).max())
 
     def corners(self) -> np.ndarray:
         """World positions (8, 3) of the corners of the box around the middles of all texels."""
+        return self._box.copy()
+
+    @cached_property
+    def _box(self) -> np.ndarray:
         shown = self.middles[self.areas > 0]
         low, high = shown.min(axis=0), shown.max(axis=0)
         x, y, z = np.meshgrid(*zip(low, high), indexing="ij")
@@ -122,8 +127,8 @@ class BentGrid:
 
     def height_of(self, point: Vector) -> float:
         """Largest distance of a world point from the tangent planes of all texels, outward; negative if behind all."""
-        shown = self.areas > 0
-        return float(np.einsum("nc,nc->n", point - self.middles[shown], self.normals[shown]).max())
+        heights = np.einsum("yxc,yxc->yx", point - self.middles, self.normals)
+        return float(heights[self.areas > 0].max())
 
     def heights_of(self, points: np.ndarray) -> np.ndarray:
         """The same of points (N, 3), at most: their distance from the middle, and half the surface's diagonal."""
