@@ -19,6 +19,10 @@ ALBEDO = (0.95, 0.9, 0.6)
 PATHS = np.array((1.0, 0.8, 0.6))
 WHITE = [1.0, 1.0, 1.0]
 MEDIUM = Medium(0.8, 1.4)
+LARGE_ALBEDO = (0.99904, 0.9984, 0.99763)
+"""Marble's, without anisotropy."""
+RUNS = 4
+"""Runs of which the least counts."""
 PER_SECOND = 100_000 / 3
 """Samples per second that are asked for, with one lamp on two cores."""
 
@@ -84,10 +88,10 @@ def timed(function, *arguments, **options):
 class Run:
     """A solution with its seconds."""
 
-    def __init__(self, ldf, light, texels, **options):
+    def __init__(self, ldf, light, texels, albedo=ALBEDO, **options):
         samples, travel, irradiance = light
         paths = texels * PATHS * math.sqrt(samples[:, 9].mean())
-        arguments = samples, [ldf] * 3, list(ALBEDO), list(paths)
+        arguments = samples, [ldf] * 3, list(albedo), list(paths)
         options = {"tolerance": TOLERANCE, "max_angle": 89.0} | options
         field, wall, cpu = timed(_native_test.SurfaceField, *arguments, **options)
         _, add_wall, add_cpu = timed(field.add, travel, irradiance, WHITE)
@@ -131,6 +135,30 @@ def beside_fft(ldf, count):
         )
 
 
+def large(ldf, count):
+    print(
+        f"\nbodies of marble, {count} samples, so large that a texel is 6 and 60 mean free paths: CPU seconds with and "
+        "without the tables of the medium, over those of fft on a plane"
+    )
+    side = round(math.sqrt(count))
+    flat = under_lamp(plane, count, lambda normal: np.tile((1.0, 0.0, 0.0), (len(normal), 1)))
+    travel, irradiance = flat[1].reshape(side, side, 3), np.ascontiguousarray(flat[2][:, 0].reshape(side, side))
+    for texels in (0.16, 0.016):
+        paths = tuple(texels * PATHS * 2 / side)
+        cpu = min(
+            timed(convolve, irradiance, travel, ldf, LARGE_ALBEDO, paths, 2 / side, tolerance=TOLERANCE)[2]
+            for _ in range(RUNS)
+        )
+        for body in (plane, waves, ball):
+            light = flat if body is plane else under_lamp(body, count)
+            first, *others = [Run(ldf, light, texels, LARGE_ALBEDO).cpu for _ in range(RUNS)]
+            print(
+                f"  {body.__name__:5s} path {texels:4g} texels: {first:.2f}, {min(others):.2f} s, "
+                f"{first / cpu:.1f} and {min(others) / cpu:.1f} times {cpu:.2f} s",
+                flush=True,
+            )
+
+
 def errors(ldf, count):
     print(f"\n{count} samples against all pairs: worst sample of the brightest, and sum; seconds of both")
     for body in (ball, waves):
@@ -152,6 +180,7 @@ def main(largest=1_000_000):
     print(f"LDFs of {len(curved.curvatures)} curvatures")
     growth(curved, [count for count in (10_000, 100_000, 1_000_000) if count < largest] + [largest])
     beside_fft(curved, min(largest, 1_000_000))
+    large(library(Medium(0.0, 1.5), "preview", curved=largest >= 10_000), min(largest, 512**2))
     errors(curved, min(largest, 20_000))
 
 

@@ -217,6 +217,37 @@ def test_pairs_choose_kernels_by_chord_azimuth_and_curvature(is_colored):
     assert (error / expected[samples_dark].max(axis=0)).max() < 1e-3
 
 
+@pytest.mark.parametrize(("path", "size"), [(0.02, 128), (0.12, 256)])
+@pytest.mark.parametrize("is_colored", [True, False], ids=["colored", "gray"])
+def test_results_of_few_functions_side_by_side_are_as_each_alone(path, size, is_colored):
+    """The functions of three results fill one or two vectors in place of three; their kernels are chosen together."""
+    samples, travel, irradiance = body("ball_6", 1.2)
+    paths, tolerance = [path, 0.8 * path, 1.3 * path], 1e-2
+    ldf = library(Medium(0.8, 1.4))
+    if is_colored:
+        irradiance = irradiance * np.random.default_rng(2).uniform(0, 1, irradiance.shape).astype(np.float32)
+
+    def solved(channels):
+        field = _native_test.SurfaceField(
+            samples,
+            [ldf] * len(channels),
+            [ALBEDO[c] for c in channels],
+            [paths[c] for c in channels],
+            tolerance=tolerance,
+            is_colored=is_colored,
+            is_direct=True,
+        )
+        power = np.zeros_like(irradiance)
+        power[:, : len(channels)] = irradiance[:, channels]
+        field.add(travel, power, [1.0] * len(channels))
+        return field.solve(), field.moment_bytes
+
+    together, moment_bytes = solved([0, 1, 2])
+    assert moment_bytes == size
+    alone = np.concatenate([solved([c])[0] for c in range(3)], axis=1)
+    assert relative_error(together, alone) < tolerance
+
+
 def test_share_of_the_area_that_bends_too_much():
     """A ball within the curvatures, and beyond them; a plane never is."""
     ball = body("ball_6", 6.0)

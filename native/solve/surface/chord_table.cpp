@@ -4,6 +4,7 @@
 #include <array>
 #include <cmath>
 #include <optional>
+#include <utility>
 
 #include "base/constants.h"
 #include "solve/surface/lattice_excess.h"
@@ -25,6 +26,9 @@ constexpr double least_chord = 0.1;
 
 // Step of the chord, relative, for derivatives. Smaller: the profiles' bins and their noise show; larger: less exact.
 constexpr double derivative_step = 0.15;
+
+// Least distance of two curvatures of shared tables, over the range of all. Nearer ones count as one.
+constexpr double least_node_distance = 1e-6;
 
 // Rings of a disk and points on half of each, at which curvatures are compared. More: smaller errors, more time.
 constexpr std::size_t compared_rings = 4;
@@ -68,16 +72,20 @@ struct DiskPoints {
     }
 };
 
-// Largest value of each lane of a row, of all curvatures, where the light is at its most in each function.
+// Largest value of each function of a row, of all curvatures, where the light is at its most in each function.
 std::vector<double> largest_values(const SurfaceBasis& basis, const ChordTable& point, std::size_t result,
                                    std::size_t row)
 {
-    std::vector<double> largest(basis.largest.size());
-    for (std::size_t lane = 0; lane < largest.size(); ++lane) {
+    std::vector<double> largest(basis.functions());
+    const std::size_t group = basis.lanes.group(result);
+    const std::size_t lanes = basis.lanes.lanes();
+    const std::size_t curvatures = point.values[group].size() / (point.rows * lanes);
+    for (std::size_t f = 0; f < largest.size(); ++f) {
+        const float* values = point.values[group].data() + row * lanes + basis.lanes.lane(result, f);
         float value = 0.0f;
-        for (std::size_t k = 0; k < curvature_count(basis, result); ++k)
-            value = std::max(value, std::abs(point.values[result][(k * point.rows + row) * basis.functions() + lane]));
-        largest[lane] = static_cast<double>(value * basis.largest[lane]);
+        for (std::size_t k = 0; k < curvatures; ++k)
+            value = std::max(value, std::abs(values[k * point.rows * lanes]));
+        largest[f] = static_cast<double>(value * basis.largest[f]);
     }
     return largest;
 }
@@ -86,18 +94,18 @@ void choose_blocks(const SurfaceBasis& basis, double tolerance, PointTable& tabl
 {
     const ChordTable& point = table.light;
     table.blocks.assign(point.rows, {});
-    for (std::size_t r = 0; r < point.values.size(); ++r) {
+    for (std::size_t r = 0; r < basis.lanes.results; ++r) {
         // Power beyond a chord of each block and those after it.
-        std::vector<double> beyond(basis.blocks);
+        std::vector<double> beyond(basis.lanes.blocks);
         double all = 0.0;
         bool is_lit = false;
         for (const bool is_known : {false, true})
             for (std::size_t row = point.rows; row-- > 0;) {
-                std::vector<double> power(basis.blocks);
+                std::vector<double> power(basis.lanes.blocks);
                 const std::vector<double> largest = largest_values(basis, point, r, row);
-                for (std::size_t lane = 0; lane < largest.size(); ++lane)
-                    for (std::size_t b = 0; b <= lane / lanes_per_block; ++b)
-                        power[b] += largest[lane];
+                for (std::size_t f = 0; f < largest.size(); ++f)
+                    for (std::size_t b = 0; b <= basis.lanes.lane(r, f) / lanes_per_block; ++b)
+                        power[b] += largest[f];
                 const float chord = chord_of(point.first + static_cast<std::uint32_t>(row));
                 const float next = chord_of(point.first + static_cast<std::uint32_t>(row + 1));
                 const double octave = std::log(static_cast<double>(next / chord));
@@ -107,13 +115,53 @@ void choose_blocks(const SurfaceBasis& basis, double tolerance, PointTable& tabl
                 }
                 // Far light that the first block leaves out has one sign, so that errors add up: the block stays as long as there is light.
                 is_lit = is_lit || power[0] > 0.0;
-                for (std::size_t b = 0; b < basis.blocks; ++b) {
+                std::uint8_t& blocks = table.blocks[row][basis.lanes.group(r)];
+                for (std::size_t b = 0; b < basis.lanes.blocks; ++b) {
                     beyond[b] += octave * power[b];
                     if (b == 0 ? is_lit : beyond[b] > block_share * tolerance * all)
-                        table.blocks[row][r] = static_cast<std::uint8_t>(b + 1);
+                        blocks = std::max(blocks, static_cast<std::uint8_t>(b + 1));
                 }
             }
     }
+}
+
+// Values of a table at a curvature, 1 / metre, by those of a result at its nodes: index of the lower one, and the part of
+// the way to the next.
+std::pair<std::size_t, double> find_node(const std::vector<double>& nodes, double curvature)
+{
+    if (nodes.size() == 1 || curvature <= nodes.front())
+        return {0, 0.0};
+    if (curvature >= nodes.back())
+        return {nodes.size() - 2, 1.0};
+    const auto above = std::upper_bound(nodes.begin(), nodes.end(), curvature);
+    const auto k = static_cast<std::size_t>(above - nodes.begin()) - 1;
+    return {k, (curvature - nodes[k]) / (nodes[k + 1] - nodes[k])};
+}
+
+// Turns values of each result, [curvature][row][function], into those of groups of lanes.
+void place_in_lanes(const SurfaceBasis& basis, ChordTable& table)
+{
+    const std::size_t functions = basis.functions();
+    const std::size_t lanes = basis.lanes.lanes();
+    std::vector<AlignedVector<float>> groups(basis.lanes.groups);
+    for (std::size_t r = 0; r < basis.lanes.results; ++r) {
+        const std::size_t group = basis.lanes.group(r);
+        const std::vector<double> all = group_curvatures(basis, group);
+        const std::vector<double> own = curvatures_of(basis, r);
+        groups[group].resize(all.size() * table.rows * lanes, 0.0f);
+        for (std::size_t k = 0; k < all.size(); ++k) {
+            const auto [low, part] = find_node(own, all[k]);
+            const float to_next = static_cast<float>(part);
+            for (std::size_t row = 0; row < table.rows; ++row) {
+                const float* from = table.values[r].data() + (low * table.rows + row) * functions;
+                const float* next = to_next > 0.0f ? from + table.rows * functions : from;
+                float* to = groups[group].data() + (k * table.rows + row) * lanes;
+                for (std::size_t f = 0; f < functions; ++f)
+                    to[basis.lanes.lane(r, f)] = from[f] + to_next * (next[f] - from[f]);
+            }
+        }
+    }
+    table.values = std::move(groups);
 }
 
 void make_derivatives(const SurfaceBasis& basis, PointTable& table)
@@ -125,11 +173,11 @@ void make_derivatives(const SurfaceBasis& basis, PointTable& table)
     table.along = laplacian;
     table.across = laplacian;
     const std::size_t lanes = basis.functions();
-    for (std::size_t r = 0; r < point.values.size(); ++r) {
+    for (std::size_t r = 0; r < basis.lanes.results; ++r) {
         const std::size_t nodes = curvature_count(basis, r);
-        AlignedVector<float>& values = laplacian.values.emplace_back(point.values[r].size(), 0.0f);
-        AlignedVector<float>& along = table.along.values.emplace_back(point.values[r].size(), 0.0f);
-        AlignedVector<float>& across = table.across.values.emplace_back(point.values[r].size(), 0.0f);
+        AlignedVector<float>& values = laplacian.values.emplace_back(nodes * point.rows * lanes, 0.0f);
+        AlignedVector<float>& along = table.along.values.emplace_back(values.size(), 0.0f);
+        AlignedVector<float>& across = table.across.values.emplace_back(values.size(), 0.0f);
         parallel_for(nodes * point.rows, [&](std::size_t item) {
             const std::size_t curvature = item / point.rows;
             const std::size_t row = item % point.rows;
@@ -143,22 +191,24 @@ void make_derivatives(const SurfaceBasis& basis, PointTable& table)
                 const Harmonics before = at(1.0 - derivative_step);
                 const Harmonics here = at(1.0);
                 const Harmonics after = at(1.0 + derivative_step);
-                for (std::size_t lane = 0; lane < basis.rank.size(); ++lane) {
-                    if (basis.rank[lane] != rank)
+                for (std::size_t f = 0; f < lanes; ++f) {
+                    if (basis.rank[f] != rank)
                         continue;
-                    const auto m = static_cast<std::size_t>(basis.harmonic[lane]);
+                    const auto m = static_cast<std::size_t>(basis.harmonic[f]);
                     const double second = (before[m] - 2.0 * here[m] + after[m]) / (derivative_step * derivative_step);
                     const double first = (after[m] - before[m]) / (2.0 * derivative_step);
-                    values[item * lanes + lane] = static_cast<float>(
+                    values[item * lanes + f] = static_cast<float>(
                         (second + first - static_cast<double>(m * m) * here[m]) * in_paths * in_paths);
-                    along[item * lanes + lane] = static_cast<float>(
+                    along[item * lanes + f] = static_cast<float>(
                         (second - first + static_cast<double>(m * m) * here[m]) * in_paths * in_paths);
-                    across[item * lanes + lane] =
+                    across[item * lanes + f] =
                         static_cast<float>((static_cast<double>(2 * m) * (here[m] - first)) * in_paths * in_paths);
                 }
             }
         });
     }
+    for (ChordTable* derivative : {&table.laplacian, &table.along, &table.across})
+        place_in_lanes(basis, *derivative);
 }
 
 }  // namespace
@@ -178,6 +228,30 @@ std::size_t flat_index(const SurfaceBasis& basis, std::size_t result)
 std::size_t curvature_count(const SurfaceBasis& basis, std::size_t result)
 {
     return basis.curvatures[basis.terms.sets.results[result].medium].size();
+}
+
+std::vector<double> curvatures_of(const SurfaceBasis& basis, std::size_t result)
+{
+    const std::size_t medium = basis.terms.sets.results[result].medium;
+    std::vector<double> nodes = basis.curvatures[medium];
+    for (double& node : nodes)
+        node /= basis.terms.sets.media[medium].mean_free_path;
+    return nodes;
+}
+
+std::vector<double> group_curvatures(const SurfaceBasis& basis, std::size_t group)
+{
+    if (!basis.lanes.is_shared())
+        return curvatures_of(basis, group);
+    std::vector<double> all;
+    for (std::size_t r = 0; r < basis.lanes.results; ++r)
+        for (const double node : curvatures_of(basis, r))
+            all.push_back(node);
+    std::sort(all.begin(), all.end());
+    const double width = all.back() - all.front();
+    const auto is_same = [width](double a, double b) { return b - a <= least_node_distance * width; };
+    all.erase(std::unique(all.begin(), all.end(), is_same), all.end());
+    return all;
 }
 
 void fill_chord_table(const SurfaceBasis& basis, ChordTable& table, float radius, float end)
@@ -203,9 +277,9 @@ void fill_chord_table(const SurfaceBasis& basis, ChordTable& table, float radius
     const auto write = [&](const Item& item, std::size_t curvature, std::size_t row, const Harmonics& at_chord) {
         const double c = chord_at(row) / profiles_of(basis, item.result, curvature)[item.rank].mean_free_path;
         float* values = table.values[item.result].data() + (curvature * table.rows + row) * lanes;
-        for (std::size_t lane = 0; lane < basis.rank.size(); ++lane)
-            if (basis.rank[lane] == item.rank)
-                values[lane] = static_cast<float>(at_chord[static_cast<std::size_t>(basis.harmonic[lane])] * c * c);
+        for (std::size_t f = 0; f < lanes; ++f)
+            if (basis.rank[f] == item.rank)
+                values[f] = static_cast<float>(at_chord[static_cast<std::size_t>(basis.harmonic[f])] * c * c);
     };
     if (radius == 0.0f) {
         parallel_for(items.size(), [&](std::size_t i) {
@@ -215,6 +289,7 @@ void fill_chord_table(const SurfaceBasis& basis, ChordTable& table, float radius
                     write(items[i], k, row, scaled.profile.density(chord_at(row) / scaled.mean_free_path));
             }
         });
+        place_in_lanes(basis, table);
         return;
     }
     // Means over a disk take long. Curvature changes profiles by functions that are smooth at the pole: few points are
@@ -247,6 +322,7 @@ void fill_chord_table(const SurfaceBasis& basis, ChordTable& table, float radius
             write(item, k, row, mean);
         }
     });
+    place_in_lanes(basis, table);
 }
 
 DiskTable make_disk(const SurfaceBasis& basis, float radius, float reach)
@@ -254,20 +330,24 @@ DiskTable make_disk(const SurfaceBasis& basis, float radius, float reach)
     DiskTable disk{radius, disk_begin_radii * radius, disk_end_radii * radius, {}, {}};
     disk.light.first = chord_step(disk_first_radii * radius);
     fill_chord_table(basis, disk.light, radius, std::min(disk.end, reach));
-    const std::size_t results = disk.light.values.size();
-    const std::size_t lanes = basis.functions();
-    for (std::size_t r = 0; r < results; ++r) {
-        AlignedVector<float>& excess = disk.excess.emplace_back(neighborhood_count * 2 * lanes, 0.0f);
+    const std::size_t lanes = basis.lanes.lanes();
+    disk.excess.resize(basis.lanes.groups, AlignedVector<float>(neighborhood_count * 2 * lanes, 0.0f));
+    for (std::size_t r = 0; r < basis.lanes.results; ++r) {
+        AlignedVector<float>& excess = disk.excess[basis.lanes.group(r)];
         const std::vector<ScaledProfile>& profiles = profiles_of(basis, r, flat_index(basis, r));
         parallel_for(profiles.size(), [&](std::size_t rank) {
-            const std::vector<double> of_rank =
-                lattice_excess(profiles[rank].profile, static_cast<double>(radius) / profiles[rank].mean_free_path);
-            for (std::size_t lane = 0; lane < basis.rank.size(); ++lane) {
-                const auto m = static_cast<std::size_t>(basis.harmonic[lane]);
-                if (basis.rank[lane] != rank || m % 2 != 0)
+            std::size_t harmonics = 0;
+            for (std::size_t f = 0; f < basis.functions(); ++f)
+                if (const auto m = static_cast<std::size_t>(basis.harmonic[f]); basis.rank[f] == rank && m % 2 == 0)
+                    harmonics = std::max(harmonics, m / 2 + 1);
+            const std::vector<double> of_rank = lattice_excess(
+                profiles[rank].profile, static_cast<double>(radius) / profiles[rank].mean_free_path, harmonics);
+            for (std::size_t f = 0; f < basis.functions(); ++f) {
+                const auto m = static_cast<std::size_t>(basis.harmonic[f]);
+                if (basis.rank[f] != rank || m % 2 != 0)
                     continue;
                 for (std::size_t row = 0; row < 2 * neighborhood_count; ++row)
-                    excess[row * lanes + lane] =
+                    excess[row * lanes + basis.lanes.lane(r, f)] =
                         static_cast<float>(of_rank[(row / 2 * even_harmonics + m / 2) * 2 + row % 2]);
             }
         });

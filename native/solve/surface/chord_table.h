@@ -34,7 +34,7 @@ inline constexpr std::size_t max_results = 3;
 struct ChordTable {
     std::uint32_t first = 0;                   // step of the first row
     std::uint32_t rows = 0;                    // at least 2
-    std::vector<AlignedVector<float>> values;  // [result], [curvature][row][block][lane]
+    std::vector<AlignedVector<float>> values;  // [group of `PairLanes`], [curvature][row][lane]
 
     std::size_t bytes() const
     {
@@ -55,7 +55,7 @@ struct DiskTable {
     float begin = 0.0f;   // least chord of other samples, metres: samples do not overlap, disks may
     float end = 0.0f;     // chord from which its light counts as a point's, metres
     ChordTable light;
-    std::vector<AlignedVector<float>> excess;  // [result], [neighborhood][cosine, sine][lane]: see `lattice_excess`
+    std::vector<AlignedVector<float>> excess;  // [group], [neighborhood][cosine, sine][lane]: see `lattice_excess`
 };
 
 // Light of a point.
@@ -64,7 +64,7 @@ struct PointTable {
     // Second derivatives times c^4, with the rows of `light`: e'' + e' / c - m^2 e / c^2; that along the chord less that
     // across it, e'' - e' / c + m^2 e / c^2; and that along both, 2 m (e / c^2 - e' / c).
     ChordTable laplacian, along, across;
-    std::vector<std::array<std::uint8_t, max_results>> blocks;  // [row][result] that matter from this chord on
+    std::vector<std::array<std::uint8_t, max_results>> blocks;  // [row][group] that matter from this chord on
 };
 
 // Functions of a result on a surface of a curvature, [rank].
@@ -73,6 +73,10 @@ const std::vector<ScaledProfile>& profiles_of(const SurfaceBasis& basis, std::si
 // Number of curvatures of a result, and which of them is that of a plane.
 std::size_t curvature_count(const SurfaceBasis& basis, std::size_t result);
 std::size_t flat_index(const SurfaceBasis& basis, std::size_t result);
+
+// Curvatures of a result, and those of the tables of a group, which are the curvatures of all its results, 1 / metre.
+std::vector<double> curvatures_of(const SurfaceBasis& basis, std::size_t result);
+std::vector<double> group_curvatures(const SurfaceBasis& basis, std::size_t group);
 
 // Fills a table of a disk (radius 0: a point) up to a chord.
 void fill_chord_table(const SurfaceBasis& basis, ChordTable& table, float radius, float end);

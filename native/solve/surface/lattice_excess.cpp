@@ -188,11 +188,12 @@ Neighborhoods::Neighborhoods(const LatticeShape& shape, float octaves)
     }
 }
 
-std::vector<double> lattice_excess(const RadialProfile& profile, double disk)
+std::vector<double> lattice_excess(const RadialProfile& profile, double disk, std::size_t harmonics)
 {
     constexpr std::size_t values = 2 * even_harmonics;
     std::vector<double> excess(neighborhood_count * values, 0.0);
     std::vector<std::array<double, values>> rings(circle_count);
+    const std::vector<Coverage>& all = coverages();
     for (std::size_t layer = 0; layer < ratio_count; ++layer) {
         const double root = std::sqrt(pi) * disk / ratio_of(layer);
         Harmonics inside = profile.cumulative(root * circle(0.0));
@@ -204,9 +205,12 @@ std::vector<double> lattice_excess(const RadialProfile& profile, double disk)
         }
         constexpr std::size_t shapes = across_count * along_count;
         for (std::size_t n = layer * shapes; n < (layer + 1) * shapes; ++n)
-            for (std::size_t i = coverages()[n].begin; i < coverages()[n].end; ++i)
-                for (std::size_t v = 0; v < values; ++v)
-                    excess[n * values + v] += rings[i][v] * coverages()[n].circles[i][v];
+            for (std::size_t v = 0; v < 2 * harmonics; ++v) {
+                double sum = 0.0;
+                for (std::size_t i = all[n].begin; i < all[n].end; ++i)
+                    sum += rings[i][v] * all[n].circles[i][v];
+                excess[n * values + v] = sum;
+            }
     }
     return excess;
 }

@@ -63,7 +63,7 @@ inline constexpr std::size_t even_harmonics = surface_harmonics / 2;
 
 // The excess per irradiance of the harmonics c_m(r) cos(m (phi - beta)) of a profile, each as factors of cos and
 // sin(m beta), with azimuths from the shortest step: [neighborhood][m / 2][cosine, sine]. That of odd m is 0. `disk`: radius
-// of the neighbors' disks in mean free paths.
-std::vector<double> lattice_excess(const RadialProfile& profile, double disk);
+// of the neighbors' disks in mean free paths; `harmonics`: number of even ones that are wanted, the others are 0.
+std::vector<double> lattice_excess(const RadialProfile& profile, double disk, std::size_t harmonics);
 
 }  // namespace beamspread

@@ -11,6 +11,7 @@
 #include <cmath>
 #include <cstring>
 #include <limits>
+#include <type_traits>
 
 #include "solve/surface/pair_sum.h"
 
@@ -32,26 +33,16 @@ constexpr float steep = 0.5f;
     std::memcpy(&lanes, values, sizeof(lanes));
 }
 
-[[gnu::always_inline]] inline float sum_of(const Lanes& lanes)
-{
-    std::array<float, lanes_per_block> values;
-    std::memcpy(values.data(), &lanes, sizeof(lanes));
-    for (std::size_t width = lanes_per_block / 2; width > 0; width /= 2)
-        for (std::size_t i = 0; i < width; ++i)
-            values[i] += values[i + width];
-    return values[0];
-}
-
-// Real and imaginary part of the powers m below 8 of x + i y.
-[[gnu::always_inline]] inline void powers(float x, float y, Harmonics8& real, Harmonics8& imaginary)
+// Real and imaginary part of the powers m below 2^count of x + i y; count is at most 3.
+[[gnu::always_inline]] inline void powers(float x, float y, std::size_t count, Harmonics8& real, Harmonics8& imaginary)
 {
     constexpr std::array<Harmonics8, 3> bits = {Harmonics8{0, 1, 0, 1, 0, 1, 0, 1}, Harmonics8{0, 0, 1, 1, 0, 0, 1, 1},
                                                 Harmonics8{0, 0, 0, 0, 1, 1, 1, 1}};
     real = Harmonics8{} + 1.0f;
     imaginary = Harmonics8{};
-    for (const Harmonics8& bit : bits) {
-        const Harmonics8 by_x = 1.0f + bit * (x - 1.0f);
-        const Harmonics8 by_y = bit * y;
+    for (std::size_t i = 0; i < count; ++i) {
+        const Harmonics8 by_x = 1.0f + bits[i] * (x - 1.0f);
+        const Harmonics8 by_y = bits[i] * y;
         const Harmonics8 next = real * by_x - imaginary * by_y;
         imaginary = imaginary * by_x + real * by_y;
         real = next;
@@ -114,18 +105,20 @@ struct Pairs {
     Floats across;  // and those of the chord and a line across it, negative
 };
 
-// Rows of a table around a chord and a curvature, and their weights, for each target.
+// Rows of a group's table around a chord and a curvature, and their weights, for each target.
 struct Rows {
     std::array<std::uint32_t, PairTargets::most> first;    // the value of the lower chord and curvature
     std::array<std::uint32_t, PairTargets::most> to_high;  // to that of the next curvature
     std::array<Floats, 4> weight;                          // 0 for the next curvature at a node
-    std::array<float, PairTargets::most> to_next;
+    std::array<std::uint32_t, PairTargets::most> nearest;  // for derivatives, which are smooth and small
 };
 
 // `target` has positions, then normals.
+template <class Source>
 [[gnu::always_inline]] inline void find_pairs(const PairTables& tables, const std::array<Floats, 6>& target,
-                                              const PairSource& source, bool is_cluster, Pairs& pairs)
+                                              const Source& source, Pairs& pairs)
 {
+    constexpr bool is_cluster = std::is_same_v<Source, ClusterSource>;
     const Floats dx = target[0] - source.position.x;
     const Floats dy = target[1] - source.position.y;
     const Floats dz = target[2] - source.position.z;
@@ -136,7 +129,7 @@ struct Rows {
     Integers first = Integers{} + static_cast<std::int32_t>(point.first);
     Integers last = first + static_cast<std::int32_t>(point.rows - 2);
     pairs.is_disk = Integers{};
-    if (!is_cluster) {
+    if constexpr (!is_cluster) {
         const DiskTable& disk = *tables.disks[source.disk];
         pairs.is_disk = chord < disk.end;
         chord = (pairs.is_disk & (chord < disk.begin)) ? Floats{} + disk.begin : chord;
@@ -159,8 +152,10 @@ struct Rows {
     pairs.per_square = one / square;
     pairs.curvature =
         (target[3] - source.normal.x) * dx + (target[4] - source.normal.y) * dy + (target[5] - source.normal.z) * dz;
-    pairs.curvature = is_cluster ? (pairs.curvature + source.bend) / (square + 4.0f * source.spread)
-                                 : pairs.curvature * pairs.per_square;
+    if constexpr (is_cluster)
+        pairs.curvature = (pairs.curvature + source.bend) / (square + 4.0f * source.spread);
+    else
+        pairs.curvature *= pairs.per_square;
     const Floats x = dx * source.tangent.x + dy * source.tangent.y + dz * source.tangent.z;
     const Floats y = dx * source.binormal.x + dy * source.binormal.y + dz * source.binormal.z;
     Floats across = x * x + y * y;
@@ -173,7 +168,7 @@ struct Rows {
     const Floats per_across = one / (across < least_across ? least_across : across);
     pairs.cosine = x * per_across;
     pairs.sine = y * per_across;
-    if (is_cluster) {
+    if constexpr (is_cluster) {
         const auto& [xx, yy, zz, xy, yz, zx] = source.squares;
         const Floats by_x = xx * dx + xy * dy + zx * dz;
         const Floats by_y = xy * dx + yy * dy + yz * dz;
@@ -187,38 +182,66 @@ struct Rows {
     }
 }
 
+// Index of the node before each curvature, and the part of the way to the next.
+[[gnu::always_inline]] inline void find_nodes(const CurvatureScale& scale, const Floats& curvature, Integers& node,
+                                              Floats& part)
+{
+    node = Integers{};
+    part = Floats{};
+    if (scale.per_step == 0.0f)
+        return;
+    // Most pairs bend little.
+    std::int32_t all_between = scale.middle > 0 ? -1 : 0;
+    if (scale.middle > 0) {
+        const Integers is_between =
+            (curvature >= scale.nodes[scale.middle - 1]) & (curvature < scale.nodes[scale.middle + 1]);
+        for (std::size_t i = 0; i < PairTargets::most; ++i)
+            all_between &= is_between[i];
+    }
+    if (all_between != 0) {
+        const Integers is_above = curvature >= scale.nodes[scale.middle];
+        node = static_cast<std::int32_t>(scale.middle - 1) - is_above;
+        part = is_above ? (curvature - scale.nodes[scale.middle]) * scale.per_width[scale.middle]
+                        : (curvature - scale.nodes[scale.middle - 1]) * scale.per_width[scale.middle - 1];
+    } else {
+        std::array<float, PairTargets::most> parts;
+        std::array<std::int32_t, PairTargets::most> nodes;
+        for (std::size_t i = 0; i < PairTargets::most; ++i) {
+            const std::size_t k = scale.interval_of(curvature[i]);
+            nodes[i] = static_cast<std::int32_t>(k);
+            parts[i] = (curvature[i] - scale.nodes[k]) * scale.per_width[k];
+        }
+        load_targets(parts, part);
+        std::memcpy(&node, nodes.data(), sizeof(node));
+    }
+    const Floats zero{};
+    const Integers is_next = (part > 1.0f - least_part) & (part < 1.0f + least_part);
+    node -= is_next;
+    part = is_next | ((part > -least_part) & (part < least_part)) ? zero : part;
+}
+
 [[gnu::always_inline]] inline void find_rows(const PairTables& tables, const PairSource& source, const Pairs& pairs,
-                                             const CurvatureScale& scale, bool is_cluster, Integers& is_inside,
-                                             Rows& rows)
+                                             const CurvatureScale& scale, bool is_cluster, Rows& rows)
 {
     const Floats low = Floats{} + scale.nodes.front();
     const Floats high = Floats{} + scale.nodes.back();
     const Floats& curvature = pairs.curvature;
-    const Floats inside = curvature < low ? low : curvature > high ? high : curvature;
-    is_inside = inside == curvature;
-    const std::uint32_t lanes = static_cast<std::uint32_t>(tables.blocks * lanes_per_block);
-    const std::uint32_t point_rows = tables.point->light.rows;
-    const std::uint32_t disk_rows = is_cluster ? 0 : tables.disks[source.disk]->light.rows;
-    for (std::size_t i = 0; i < PairTargets::most; ++i) {
-        std::size_t k = 0;
-        float to_next = 0.0f;
-        if (scale.per_step > 0.0f) {
-            k = scale.interval_of(inside[i]);
-            to_next = (inside[i] - scale.nodes[k]) * scale.per_width[k];
-            if (std::abs(to_next - 1.0f) < least_part) {
-                ++k;
-                to_next = 0.0f;
-            } else if (std::abs(to_next) < least_part) {
-                to_next = 0.0f;
-            }
-        }
-        const std::uint32_t count = pairs.is_disk[i] != 0 ? disk_rows : point_rows;
-        rows.first[i] = (static_cast<std::uint32_t>(k) * count + static_cast<std::uint32_t>(pairs.step[i])) * lanes;
-        rows.to_high[i] = to_next != 0.0f ? count * lanes : 0;
-        rows.to_next[i] = to_next;
-    }
+    Integers node;
     Floats to_next;
-    load_targets(rows.to_next, to_next);
+    find_nodes(scale, curvature < low ? low : curvature > high ? high : curvature, node, to_next);
+    const auto lanes = static_cast<std::int32_t>(tables.lanes.lanes());
+    const Integers point_rows = Integers{} + static_cast<std::int32_t>(tables.point->light.rows);
+    Integers count = point_rows;
+    if (!is_cluster)
+        count = pairs.is_disk ? Integers{} + static_cast<std::int32_t>(tables.disks[source.disk]->light.rows) : count;
+    const Integers first = (node * count + pairs.step) * lanes;
+    const Integers to_high = to_next != 0.0f ? count * lanes : Integers{};
+    std::memcpy(rows.first.data(), &first, sizeof(first));
+    std::memcpy(rows.to_high.data(), &to_high, sizeof(to_high));
+    if (is_cluster) {
+        const Integers nearest = first + ((pairs.part > 0.5f) & Integers{} + lanes) + ((to_next > 0.5f) & to_high);
+        std::memcpy(rows.nearest.data(), &nearest, sizeof(nearest));
+    }
     rows.weight = {(1.0f - to_next) * (1.0f - pairs.part), (1.0f - to_next) * pairs.part, to_next * (1.0f - pairs.part),
                    to_next * pairs.part};
 }
@@ -241,138 +264,158 @@ using BlockCounts = std::array<std::uint8_t, max_results>;
     return static_cast<std::size_t>(least);
 }
 
-template <std::size_t most_results, bool are_clusters>
-void add_pairs_of(const PairTables& tables, const PairTargets& targets, std::span<const PairSource> sources,
+// Sums of the targets, by the lanes of groups, and that of pairs that bend more than the tables.
+template <std::size_t most_groups>
+struct LaneSums {
+    std::array<std::array<Lanes, most_groups>, PairTargets::most> all{};
+    std::array<Lanes, PairTargets::most> beyond{};
+};
+
+// Adds the light of a source. `target` has positions, then normals.
+template <std::size_t most_groups, class Source>
+[[gnu::always_inline]] inline void add_source(const PairTables& tables, const PairTargets& targets,
+                                              const std::array<Floats, 6>& target, const Source& source,
+                                              const float* moments, std::size_t stride, LaneSums<most_groups>& sums)
+{
+    constexpr bool is_cluster = std::is_same_v<Source, ClusterSource>;
+    const std::size_t groups = is_plain ? tables.lanes.groups : most_groups;
+    const std::size_t lanes = tables.lanes.lanes();
+    const BlockCounts* point_blocks = tables.point->blocks.data();
+    BlockCounts all_blocks;
+    all_blocks.fill(static_cast<std::uint8_t>(tables.lanes.blocks));
+    Pairs pairs;
+    std::array<Rows, most_groups> rows;
+    find_pairs(tables, target, source, pairs);
+    const Integers is_beyond = (pairs.curvature < tables.least_curvature) | (pairs.curvature > tables.most_curvature);
+    const BlockCounts most =
+        is_cluster || !has_disk(pairs, targets.count) ? point_blocks[least_step(pairs, targets.count)] : all_blocks;
+    for (std::size_t g = 0; g < groups; ++g)
+        if (most[g] > 0)
+            find_rows(tables, source, pairs, tables.scales[g], is_cluster, rows[g]);
+    const float* of_source = moments + source.moments * stride;
+    const std::size_t bits = tables.lanes.harmonic_bits;
+    for (std::size_t i = 0; i < targets.count; ++i) {
+        if (!(pairs.chord[i] < tables.reach) || (!is_cluster && source.moments == targets.own[i]))
+            continue;
+        const bool is_disk = !is_cluster && pairs.is_disk[i] != 0;
+        const BlockCounts& counts = is_disk ? all_blocks : point_blocks[static_cast<std::size_t>(pairs.step[i])];
+        bool at_node = true;
+        std::size_t blocks = 0;
+        for (std::size_t g = 0; g < groups; ++g) {
+            at_node = at_node && (counts[g] == 0 || rows[g].to_high[i] == 0);
+            blocks = std::max<std::size_t>(blocks, counts[g]);
+        }
+        if (blocks == 0)
+            continue;
+        const ChordTable& table = is_disk ? tables.disks[source.disk]->light : tables.point->light;
+        const float weight = source.area * pairs.per_square[i];
+        Harmonics8 real, imaginary;
+        if (bits > 1) {
+            powers(pairs.cosine[i], pairs.sine[i], bits, real, imaginary);
+            real *= weight;
+            imaginary *= weight;
+        }
+        // Value at the place of the rows of a group.
+        const auto interpolate = [&](std::size_t g, const float* values, Lanes& value) __attribute__((always_inline)) {
+            const float* first = values + rows[g].first[i];
+            std::array<Lanes, 2> row;
+            load(first, row[0]);
+            load(first + lanes, row[1]);
+            value = row[0] * rows[g].weight[0][i] + row[1] * rows[g].weight[1][i];
+            if (at_node)
+                return;
+            const float* high = first + rows[g].to_high[i];
+            load(high, row[0]);
+            load(high + lanes, row[1]);
+            value += row[0] * rows[g].weight[2][i] + row[1] * rows[g].weight[3][i];
+        };
+        for (std::size_t b = 0; b < blocks; ++b) {
+            const std::size_t at = b * lanes_per_block;
+            Lanes cosines, sines;
+            if (bits > 1) {
+                spread(real, tables.lanes.harmonic.data() + at, cosines);
+                spread(imaginary, tables.lanes.harmonic.data() + at, sines);
+            } else {
+                Lanes is_first;  // 1 where m is 1, else 0
+                load(tables.lanes.is_first.data() + at, is_first);
+                cosines = weight + is_first * (weight * (pairs.cosine[i] - 1.0f));
+                sines = is_first * (weight * pairs.sine[i]);
+            }
+            Lanes light{};
+            Lanes turned{};
+            std::size_t set = max_results;
+            for (std::size_t g = 0; g < groups; ++g) {
+                if (b >= counts[g])
+                    continue;
+                if (tables.lanes.set[g] != set) {
+                    set = tables.lanes.set[g];
+                    const float* values = of_source + (set * tables.lanes.blocks + b) * 2 * lanes_per_block;
+                    std::array<Lanes, 2> pair;
+                    load(values, pair[0]);
+                    load(values + lanes_per_block, pair[1]);
+                    light = pair[0] * cosines + pair[1] * sines;
+                    if constexpr (is_cluster)
+                        turned = pair[1] * cosines - pair[0] * sines;
+                }
+                Lanes value;
+                interpolate(g, table.values[g].data() + at, value);
+                Lanes product = light * value;
+                // The functions of other blocks are small.
+                if constexpr (is_cluster) {
+                    if (b == 0) {
+                        Lanes second;
+                        const std::size_t nearest = rows[g].nearest[i] + at;
+                        load(tables.point->laplacian.values[g].data() + nearest, second);
+                        value += second * (source.spread * pairs.per_square[i]);
+                        load(tables.point->along.values[g].data() + nearest, second);
+                        value += second * pairs.along[i];
+                        load(tables.point->across.values[g].data() + nearest, second);
+                        product = light * value + turned * (second * pairs.across[i]);
+                    }
+                }
+                sums.all[i][g] += product;
+                if (g == 0 && is_beyond[i] != 0)
+                    sums.beyond[i] += product;
+            }
+        }
+    }
+}
+
+template <std::size_t most_groups>
+void add_pairs_of(const PairTables& tables, const PairTargets& targets, const PairSources& sources,
                   const float* moments, std::size_t stride, float* sums, float* beyond)
 {
-    const std::size_t results = is_plain ? tables.results : most_results;
     std::array<Floats, 6> target;
     for (std::size_t axis = 0; axis < 3; ++axis) {
         load_targets(targets.position[axis], target[axis]);
         load_targets(targets.normal[axis], target[3 + axis]);
     }
-    std::array<std::array<Lanes, most_results>, PairTargets::most> all{};
-    std::array<Lanes, PairTargets::most> clamped{};
-    const std::size_t lanes = tables.blocks * lanes_per_block;
-    const BlockCounts* point_blocks = tables.point->blocks.data();
-    BlockCounts all_blocks;
-    all_blocks.fill(static_cast<std::uint8_t>(tables.blocks));
-    Pairs pairs;
-    std::array<Rows, most_results> rows;
-    for (const PairSource& source : sources) {
-        find_pairs(tables, target, source, are_clusters, pairs);
-        Integers is_inside{};
-        const BlockCounts most = are_clusters || !has_disk(pairs, targets.count)
-                                     ? point_blocks[least_step(pairs, targets.count)]
-                                     : all_blocks;
-        for (std::size_t r = results; r-- > 0;)
-            if (most[r] > 0)
-                find_rows(tables, source, pairs, tables.scales[r], are_clusters, is_inside, rows[r]);
-        const float* of_source = moments + source.moments * stride;
-        for (std::size_t i = 0; i < targets.count; ++i) {
-            if (!(pairs.chord[i] < tables.reach) || (!are_clusters && source.moments == targets.own[i]))
-                continue;
-            const bool is_disk = !are_clusters && pairs.is_disk[i] != 0;
-            const BlockCounts& counts = is_disk ? all_blocks : point_blocks[static_cast<std::size_t>(pairs.step[i])];
-            bool at_node = true;
-            std::size_t blocks = 0;
-            for (std::size_t r = 0; r < results; ++r) {
-                at_node = at_node && (counts[r] == 0 || rows[r].to_high[i] == 0);
-                blocks = std::max<std::size_t>(blocks, counts[r]);
-            }
-            if (blocks == 0)
-                continue;
-            const ChordTable& table = is_disk ? tables.disks[source.disk]->light : tables.point->light;
-            Harmonics8 real, imaginary;
-            powers(pairs.cosine[i], pairs.sine[i], real, imaginary);
-            const float weight = source.area * pairs.per_square[i];
-            real *= weight;
-            imaginary *= weight;
-            // Value at the place of the rows of a result.
-            const auto interpolate = [&](std::size_t r, const float* values, Lanes& value)
-                                         __attribute__((always_inline)) {
-                                             const float* first = values + rows[r].first[i];
-                                             std::array<Lanes, 2> row;
-                                             load(first, row[0]);
-                                             load(first + lanes, row[1]);
-                                             value = row[0] * rows[r].weight[0][i] + row[1] * rows[r].weight[1][i];
-                                             if (at_node)
-                                                 return;
-                                             const float* high = first + rows[r].to_high[i];
-                                             load(high, row[0]);
-                                             load(high + lanes, row[1]);
-                                             value += row[0] * rows[r].weight[2][i] + row[1] * rows[r].weight[3][i];
-                                         };
-            for (std::size_t b = 0; b < blocks; ++b) {
-                const std::size_t at = b * lanes_per_block;
-                Lanes cosines, sines;
-                spread(real, tables.harmonic.data() + at, cosines);
-                spread(imaginary, tables.harmonic.data() + at, sines);
-                Lanes light{};
-                Lanes turned{};
-                std::size_t set = tables.results;
-                for (std::size_t r = 0; r < results; ++r) {
-                    if (b >= counts[r])
-                        continue;
-                    if (tables.set[r] != set) {
-                        set = tables.set[r];
-                        const float* values = of_source + (set * tables.blocks + b) * 2 * lanes_per_block;
-                        std::array<Lanes, 2> pair;
-                        load(values, pair[0]);
-                        load(values + lanes_per_block, pair[1]);
-                        light = pair[0] * cosines + pair[1] * sines;
-                        if constexpr (are_clusters)
-                            turned = pair[1] * cosines - pair[0] * sines;
-                    }
-                    Lanes value;
-                    interpolate(r, table.values[r].data() + at, value);
-                    Lanes product = light * value;
-                    // The functions of other blocks are small.
-                    if (are_clusters && b == 0) {
-                        Lanes second;
-                        interpolate(r, tables.point->laplacian.values[r].data() + at, second);
-                        value += second * (source.spread * pairs.per_square[i]);
-                        interpolate(r, tables.point->along.values[r].data() + at, second);
-                        value += second * pairs.along[i];
-                        interpolate(r, tables.point->across.values[r].data() + at, second);
-                        product = light * value + turned * (second * pairs.across[i]);
-                    }
-                    all[i][r] += product;
-                    if (r == 0 && is_inside[i] == 0)
-                        clamped[i] += product;
-                }
-            }
-        }
-    }
+    LaneSums<most_groups> all;
+    for (const std::span<const PairSource> samples : sources.samples)
+        for (const PairSource& sample : samples)
+            add_source(tables, targets, target, sample, moments, stride, all);
+    for (const ClusterSource* cluster : sources.clusters)
+        add_source(tables, targets, target, *cluster, moments, stride, all);
+    std::array<float, lanes_per_block> values;
     for (std::size_t i = 0; i < targets.count; ++i) {
-        for (std::size_t r = 0; r < results; ++r)
-            sums[i * max_results + r] += sum_of(all[i][r]);
-        beyond[i] += sum_of(clamped[i]);
+        for (std::size_t g = 0; g < tables.lanes.groups; ++g) {
+            std::memcpy(values.data(), &all.all[i][g], sizeof(values));
+            tables.lanes.add(g, values.data(), sums + i * max_results);
+        }
+        std::array<float, max_results> of_results{};
+        std::memcpy(values.data(), &all.beyond[i], sizeof(values));
+        tables.lanes.add(0, values.data(), of_results.data());
+        beyond[i] += of_results[0];
     }
 }
 
-template <bool are_clusters>
-void add_pairs_of_kind(const PairTables& tables, const PairTargets& targets, std::span<const PairSource> sources,
-                       const float* moments, std::size_t stride, float* sums, float* beyond)
+void add_pairs(const PairTables& tables, const PairTargets& targets, const PairSources& sources, const float* moments,
+               std::size_t stride, float* sums, float* beyond)
 {
     static_assert(max_results == 3);
-    if constexpr (!is_plain) {
-        if (tables.results == 1) {
-            add_pairs_of<1, are_clusters>(tables, targets, sources, moments, stride, sums, beyond);
-            return;
-        }
-        if (tables.results == 2) {
-            add_pairs_of<2, are_clusters>(tables, targets, sources, moments, stride, sums, beyond);
-            return;
-        }
-    }
-    add_pairs_of<3, are_clusters>(tables, targets, sources, moments, stride, sums, beyond);
-}
-
-void add_pairs(const PairTables& tables, const PairTargets& targets, std::span<const PairSource> sources,
-               bool are_clusters, const float* moments, std::size_t stride, float* sums, float* beyond)
-{
-    const auto add = are_clusters ? add_pairs_of_kind<true> : add_pairs_of_kind<false>;
+    const auto add = is_plain || tables.lanes.groups == 3 ? add_pairs_of<3>
+                     : tables.lanes.groups == 2           ? add_pairs_of<2>
+                                                          : add_pairs_of<1>;
     add(tables, targets, sources, moments, stride, sums, beyond);
 }
 
@@ -384,10 +427,10 @@ HWY_AFTER_NAMESPACE();
 namespace beamspread {
 
 HWY_EXPORT(add_pairs);
-void add_pairs(const PairTables& tables, const PairTargets& targets, std::span<const PairSource> sources,
-               bool are_clusters, const float* moments, std::size_t stride, float* sums, float* beyond)
+void add_pairs(const PairTables& tables, const PairTargets& targets, const PairSources& sources, const float* moments,
+               std::size_t stride, float* sums, float* beyond)
 {
-    HWY_DYNAMIC_DISPATCH(add_pairs)(tables, targets, sources, are_clusters, moments, stride, sums, beyond);
+    HWY_DYNAMIC_DISPATCH(add_pairs)(tables, targets, sources, moments, stride, sums, beyond);
 }
 
 }  // namespace beamspread

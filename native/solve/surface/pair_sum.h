@@ -6,6 +6,7 @@
 #include <cstdint>
 #include <limits>
 #include <span>
+#include <vector>
 
 #include "base/vec.h"
 #include "solve/surface/pair_tables.h"
@@ -21,9 +22,18 @@ struct PairSource {
     Vec3f tangent;  // x of the frame
     std::uint32_t moments;  // index of its moments
     Vec3f binormal;  // y of the frame
-    float spread;  // a quarter of the mean squared distance of a cluster's light from its position, m^2
-    float bend = 0.0f;  // mean product of a cluster's normals and positions, less that of their means, m
-    std::array<float, 6> squares{};  // means of xx, yy, zz, xy, yz, zx of a cluster's light around its position, m^2
+};
+
+struct ClusterSource : PairSource {
+    float spread;  // a quarter of the mean squared distance of the light from the position, m^2
+    float bend = 0.0f;  // mean product of normals and positions, less that of their means, m
+    std::array<float, 6> squares{};  // means of xx, yy, zz, xy, yz, zx of the light around the position, m^2
+};
+
+// Sources that targets share.
+struct PairSources {
+    std::vector<std::span<const PairSource>> samples;
+    std::vector<const ClusterSource*> clusters;
 };
 
 // Targets side by side, which share their sources.
@@ -34,7 +44,7 @@ struct PairTargets {
     std::size_t count = 0;
     std::array<std::array<float, most>, 3> position{};  // [axis][target]
     std::array<std::array<float, most>, 3> normal{};
-    std::array<std::uint32_t, most> own{};  // index of the moments that are no source of a target's; or none
+    std::array<std::uint32_t, most> own{};  // index of a target's own moments, which are no source of it; or none
 
     void add(const Vec3f& at, const Vec3f& up, std::uint32_t moments)
     {
@@ -48,9 +58,8 @@ struct PairTargets {
 };
 
 // Adds the radiant exitance at targets that sources cause: sums[target][result], and in beyond[target] the part of result
-// 0 from pairs that bend more than the tables. `moments` has the sources' moments, each of `stride` values. The sources
-// are samples, or all clusters.
-void add_pairs(const PairTables& tables, const PairTargets& targets, std::span<const PairSource> sources,
-               bool are_clusters, const float* moments, std::size_t stride, float* sums, float* beyond);
+// 0 from pairs that bend more than the tables. `moments` has the sources' moments, each of `stride` values.
+void add_pairs(const PairTables& tables, const PairTargets& targets, const PairSources& sources, const float* moments,
+               std::size_t stride, float* sums, float* beyond);
 
 }  // namespace beamspread

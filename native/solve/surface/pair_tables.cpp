@@ -21,14 +21,9 @@ static_assert(SurfaceKernels::radii_per_octave % disks_per_octave == 0);
 }  // namespace
 
 PairTables::PairTables(SurfaceKernels& kernels, const SampleAreas& areas)
-    : results(kernels.basis().terms.sets.results.size()),
-      blocks(kernels.basis().blocks),
-      harmonic(kernels.basis().harmonic),
-      reach(kernels.reach())
+    : lanes(kernels.basis().lanes), reach(kernels.reach())
 {
     const SurfaceBasis& basis = kernels.basis();
-    for (const ChannelSets::Result& result : basis.terms.sets.results)
-        set.push_back(result.set);
     make_scales(basis);
     const auto radius_of = [](float area) { return std::sqrt(area * static_cast<float>(inv_pi)); };
     const auto number_of = [](float radius) {
@@ -48,14 +43,19 @@ PairTables::PairTables(SurfaceKernels& kernels, const SampleAreas& areas)
 
 void PairTables::make_scales(const SurfaceBasis& basis)
 {
-    for (const ChannelSets::Result& result : basis.terms.sets.results) {
-        const ChannelMedium& medium = basis.terms.sets.media[result.medium];
+    const std::vector<double> first = curvatures_of(basis, 0);
+    least_curvature = static_cast<float>(first.front());
+    most_curvature = static_cast<float>(first.back());
+    for (std::size_t group = 0; group < lanes.groups; ++group) {
         CurvatureScale scale;
-        for (const double curvature : basis.curvatures[result.medium])
-            scale.nodes.push_back(static_cast<float>(curvature / medium.mean_free_path));
+        for (const double curvature : group_curvatures(basis, group))
+            scale.nodes.push_back(static_cast<float>(curvature));
         if (scale.nodes.size() > 1) {
             for (std::size_t k = 0; k + 1 < scale.nodes.size(); ++k)
                 scale.per_width.push_back(1.0f / (scale.nodes[k + 1] - scale.nodes[k]));
+            const auto flat = std::lower_bound(scale.nodes.begin(), scale.nodes.end(), 0.0f) - scale.nodes.begin();
+            if (scale.nodes.size() > 2)
+                scale.middle = std::clamp<std::size_t>(static_cast<std::size_t>(flat), 1, scale.nodes.size() - 2);
             const float width = scale.nodes.back() - scale.nodes.front();
             scale.per_step = static_cast<float>(CurvatureScale::steps) / width;
             for (std::size_t i = 0; i < CurvatureScale::steps; ++i) {
@@ -72,19 +72,20 @@ void PairTables::make_self(const SurfaceBasis& basis, float min_radius, float ma
 {
     m_self.first = chord_step(min_radius);
     m_self.rows = chord_step(max_radius) - m_self.first + 2;
-    for (std::size_t r = 0; r < results; ++r) {
-        m_self.values.emplace_back(m_self.rows * blocks * lanes_per_block, 0.0f);
+    m_self.values.resize(lanes.groups, AlignedVector<float>(m_self.rows * lanes.lanes(), 0.0f));
+    for (std::size_t r = 0; r < lanes.results; ++r) {
         const std::size_t flat = flat_index(basis, r);
         const std::vector<ScaledProfile>& profiles = profiles_of(basis, r, flat);
-        parallel_for(basis.rank.size(), [&](std::size_t lane) {
-            const std::size_t rank = basis.rank[lane];
-            if (harmonic[lane] != 0)
+        parallel_for(basis.functions(), [&](std::size_t f) {
+            const std::size_t rank = basis.rank[f];
+            if (basis.harmonic[f] != 0)
                 return;
             for (std::size_t row = 0; row < m_self.rows; ++row) {
                 const float radius = chord_of(m_self.first + static_cast<std::uint32_t>(row));
                 const double within =
                     profiles[rank].profile.cumulative(static_cast<double>(radius) / profiles[rank].mean_free_path)[0];
-                m_self.values[r][row * blocks * lanes_per_block + lane] = static_cast<float>(2.0 * pi * within);
+                m_self.values[lanes.group(r)][row * lanes.lanes() + lanes.lane(r, f)] =
+                    static_cast<float>(2.0 * pi * within);
             }
         });
     }
@@ -92,16 +93,16 @@ void PairTables::make_self(const SurfaceBasis& basis, float min_radius, float ma
 
 std::vector<double> PairTables::second_derivatives(std::size_t result) const
 {
-    const std::size_t lanes = blocks * lanes_per_block;
+    const std::size_t group = lanes.group(result);
     std::vector<double> bounds(point->light.rows);
     double largest = 0.0;
     for (std::size_t row = point->light.rows; row-- > 0;) {
         const auto chord = static_cast<double>(chord_of(point->light.first + static_cast<std::uint32_t>(row)));
         float value = 0.0f;
-        for (std::size_t k = 0; k < scales[result].nodes.size(); ++k) {
-            const std::size_t at = (k * point->light.rows + row) * lanes;
+        for (std::size_t k = 0; k < scales[group].nodes.size(); ++k) {
+            const std::size_t at = (k * point->light.rows + row) * lanes.lanes() + lanes.lane(result, 0);
             value = std::max(
-                {value, std::abs(point->light.values[result][at]), std::abs(point->laplacian.values[result][at])});
+                {value, std::abs(point->light.values[group][at]), std::abs(point->laplacian.values[group][at])});
         }
         largest = std::max(largest, static_cast<double>(value) / (chord * chord * chord * chord));
         bounds[row] = largest;
@@ -120,14 +121,13 @@ std::size_t PairTables::disk(float area) const
     return std::min(static_cast<std::size_t>(std::max(nearest, 0L)), disks.size() - 1);
 }
 
-float PairTables::self_light(float area, const LatticeShape& lattice, std::size_t result, const float* moments) const
+void PairTables::add_self_light(float area, const LatticeShape& lattice, const float* moments, float* sums) const
 {
     const float radius = std::sqrt(area * static_cast<float>(inv_pi));
     const std::uint32_t step = std::clamp(chord_step(radius), m_self.first, m_self.first + m_self.rows - 2);
     const float before = chord_of(step);
     const float part = std::clamp((radius - before) / (chord_of(step + 1) - before), 0.0f, 1.0f);
-    const std::size_t lanes = blocks * lanes_per_block;
-    const float* within = m_self.values[result].data() + (step - m_self.first) * lanes;
+    const std::size_t count = lanes.lanes();
 
     // Excess of the light of all samples around. That of smaller disks than any is in proportion to their area.
     const auto place = static_cast<float>(std::clamp(place_of(radius), 0.0, static_cast<double>(disks.size() - 1)));
@@ -142,27 +142,31 @@ float PairTables::self_light(float area, const LatticeShape& lattice, std::size_
                      last.x * lattice.shortest.y + last.y * lattice.shortest.x};
     }
     const float mirrored = lattice.is_mirrored ? -1.0f : 1.0f;
-    float sum = 0.0f;
-    for (std::size_t b = 0; b < blocks; ++b) {
-        std::array<float, lanes_per_block> cosine{}, sine{};
-        for (std::size_t n = 0; n < near.index.size(); ++n) {
-            const float* values = disk.excess[result].data() + near.index[n] * 2 * lanes + b * lanes_per_block;
-            const float weight = smaller * smaller * near.weight[n];
-            for (std::size_t k = 0; k < lanes_per_block; ++k) {
-                cosine[k] += weight * values[k];
-                sine[k] += weight * values[lanes + k];
+    for (std::size_t group = 0; group < lanes.groups; ++group) {
+        const float* within = m_self.values[group].data() + (step - m_self.first) * count;
+        const float* of_set = moments + lanes.set[group] * 2 * count;
+        for (std::size_t b = 0; b < lanes.blocks; ++b) {
+            std::array<float, lanes_per_block> cosine{}, sine{};
+            for (std::size_t n = 0; n < near.index.size(); ++n) {
+                const float* values = disk.excess[group].data() + near.index[n] * 2 * count + b * lanes_per_block;
+                const float weight = smaller * smaller * near.weight[n];
+                for (std::size_t k = 0; k < lanes_per_block; ++k) {
+                    cosine[k] += weight * values[k];
+                    sine[k] += weight * values[count + k];
+                }
             }
-        }
-        const float* light = moments + b * 2 * lanes_per_block;
-        for (std::size_t k = 0; k < lanes_per_block; ++k) {
-            const std::size_t lane = b * lanes_per_block + k;
-            const Vec2f& turn = turned[static_cast<std::size_t>(harmonic[lane])];
-            const float own = within[lane] + part * (within[lanes + lane] - within[lane]);
-            sum += (own - cosine[k] * turn.x + mirrored * sine[k] * turn.y) * light[k] -
-                   (cosine[k] * turn.y + mirrored * sine[k] * turn.x) * light[lanes_per_block + k];
+            const float* light = of_set + b * 2 * lanes_per_block;
+            std::array<float, lanes_per_block> product;
+            for (std::size_t k = 0; k < lanes_per_block; ++k) {
+                const std::size_t lane = b * lanes_per_block + k;
+                const Vec2f& turn = turned[static_cast<std::size_t>(lanes.harmonic[lane])];
+                const float own = within[lane] + part * (within[count + lane] - within[lane]);
+                product[k] = (own - cosine[k] * turn.x + mirrored * sine[k] * turn.y) * light[k] -
+                             (cosine[k] * turn.y + mirrored * sine[k] * turn.x) * light[lanes_per_block + k];
+            }
+            lanes.add(group, product.data(), sums);
         }
     }
-    return sum;
 }
 
 }  // namespace beamspread

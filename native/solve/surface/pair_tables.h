@@ -13,11 +13,12 @@
 
 namespace beamspread {
 
-// Curvatures between which the tables of a result are linear.
+// Curvatures between which the tables of a group are linear.
 struct CurvatureScale {
-    static constexpr std::size_t steps = 256;
+    static constexpr std::size_t steps = 1024;
     std::vector<float> nodes;                    // 1 / metre, ascending
     std::vector<float> per_width;                // [interval] 1 / its width, metres
+    std::size_t middle = 0;                      // index of the node next to 0 between two others; 0: none
     float per_step = 0.0f;                       // steps per curvature; 0 for a single node
     std::array<std::uint8_t, steps> interval{};  // index of the node before the middle of a step
 
@@ -44,18 +45,17 @@ public:
     // Index of the disk that stands for a sample of this area, m^2.
     std::size_t disk(float area) const;
 
-    // The radiant exitance of a sample's middle by its own light, of which the moments of a set are given. On even
-    // lattices of samples, the sum of all light is then that of a plane.
-    float self_light(float area, const LatticeShape& lattice, std::size_t result, const float* moments) const;
+    // Adds the radiant exitance of a sample's middle by its own light, [result]. On even lattices of samples, the sum of
+    // all light is then that of a plane.
+    void add_self_light(float area, const LatticeShape& lattice, const float* moments, float* sums) const;
 
     // Bounds on the second derivatives of the first function, [row of the point], 1 / m^4. They don't grow with the chord.
     std::vector<double> second_derivatives(std::size_t result) const;
 
-    std::size_t results = 0;
-    std::size_t blocks = 0;
-    std::vector<std::int32_t> harmonic;  // [lane]
-    std::vector<std::size_t> set;        // [result]
-    std::vector<CurvatureScale> scales;  // [result]
+    PairLanes lanes;
+    std::vector<CurvatureScale> scales;  // [group]
+    float least_curvature = 0.0f;  // of result 0, 1 / metre; pairs below bend more than its LDFs
+    float most_curvature = 0.0f;
     float reach = 0.0f;                  // metres; light farther away counts as none
     std::vector<std::shared_ptr<const DiskTable>> disks;  // ascending
     std::shared_ptr<const PointTable> point;

@@ -115,7 +115,7 @@ SurfaceBasis::SurfaceBasis(const std::vector<ChannelMedium>& channels, double ma
         const std::size_t needed = flat.within(tolerance_ratio * tolerance).size();
         most = std::min(most, needed + needed / functions_per_curved);
     }
-    // Lanes of the functions: those of large gains first. Terms come by ascending m, then rank.
+    // Functions of large gains come first; terms come by ascending m, then rank.
     std::vector<std::size_t> order;
     const auto sort_by_gain = [&] {
         order.resize(chosen.size());
@@ -137,26 +137,32 @@ SurfaceBasis::SurfaceBasis(const std::vector<ChannelMedium>& channels, double ma
             for (std::size_t set = 0; set < terms.sets.count(); ++set)
                 if (terms.basis.functions[f].m > 0 || phase == Phase::cosine)
                     terms.terms.push_back({{}, f, phase, set, {}});
-    blocks = (chosen.size() + lanes_per_block - 1) / lanes_per_block;
-    harmonic.resize(functions());
-    m_lane.resize(chosen.size());
-    for (std::size_t lane = 0; lane < order.size(); ++lane) {
-        m_lane[order[lane]] = lane;
-        harmonic[lane] = static_cast<std::int32_t>(terms.basis.functions[order[lane]].m);
-        rank.push_back(terms.basis.functions[order[lane]].rank);
+    m_number.resize(chosen.size());
+    for (std::size_t number = 0; number < order.size(); ++number) {
+        m_number[order[number]] = number;
+        harmonic.push_back(static_cast<std::int32_t>(terms.basis.functions[order[number]].m));
+        rank.push_back(terms.basis.functions[order[number]].rank);
         float most_light = 0.0f;
         for (std::size_t step = 0; step <= terms.basis.steps; ++step)
-            most_light = std::max(most_light, std::abs(terms.basis.table[step * chosen.size() + order[lane]].value));
+            most_light = std::max(most_light, std::abs(terms.basis.table[step * chosen.size() + order[number]].value));
         largest.push_back(most_light);
     }
+    lanes = PairLanes(terms.sets, harmonic);
 }
 
-std::size_t SurfaceBasis::place(std::size_t term) const
+std::vector<std::size_t> SurfaceBasis::places(std::size_t term) const
 {
     const LightTerm& light = terms.terms[term];
-    const std::size_t lane = m_lane[light.function];
-    const std::size_t block = light.set * blocks + lane / lanes_per_block;
-    return (2 * block + (light.phase == Phase::sine ? 1 : 0)) * lanes_per_block + lane % lanes_per_block;
+    std::vector<std::size_t> all;
+    for (std::size_t result = 0; result < lanes.results; ++result) {
+        if (terms.sets.results[result].set != light.set)
+            continue;
+        const std::size_t place = lanes.place(result, m_number[light.function]);
+        all.push_back(place + (light.phase == Phase::sine ? lanes_per_block : 0));
+        if (!lanes.is_shared())
+            break;
+    }
+    return all;
 }
 
 }  // namespace beamspread

@@ -19,8 +19,8 @@ namespace {
 // Rays that pass all steps together. More: more cache.
 constexpr std::size_t rays_at_once = 512;
 
-// Leaves of the tree in one work item.
-constexpr std::size_t leaves_at_once = 16;
+// Leaves of the tree in one work item, which look for their sources together.
+constexpr std::size_t leaves_at_once = 8;
 
 // Bounds on the error of a far cluster's light over the tolerance that are tried, from the largest on, each half of the
 // one before. The first one is taken whose probed samples differ from those with a quarter of it by less than a fraction
@@ -141,7 +141,7 @@ SurfaceField::SurfaceField(const SurfaceProblem& problem, Progress& progress)
     const std::size_t moments = problem.samples.size() + m_tree.nodes();
     check_memory(moments * moment_bytes(), problem.max_moment_bytes);
     progress.advance(0.0);
-    m_moments.resize(moments * m_basis.moments());
+    m_moments.resize(moments * m_basis.lanes.moments());
 }
 
 void SurfaceField::set_color(const std::vector<double>& color)
@@ -205,9 +205,9 @@ void SurfaceField::add(std::size_t first, std::size_t count, const Vec3f* travel
             [&](std::size_t t) { return scratch.values.data() + t * rays; },
             m_problem.is_colored ? scratch.irradiance.data() : nullptr);
         for (std::size_t t = 0; t < terms.size(); ++t) {
-            const std::size_t at = m_basis.place(t);
-            for (std::size_t i = 0; i < rays; ++i)
-                m_moments[(first + x + i) * m_basis.moments() + at] += scratch.values[t * rays + i];
+            for (const std::size_t at : m_basis.places(t))
+                for (std::size_t i = 0; i < rays; ++i)
+                    m_moments[(first + x + i) * m_basis.lanes.moments() + at] += scratch.values[t * rays + i];
         }
     }
 }
@@ -223,7 +223,7 @@ void SurfaceField::solve(Progress& progress, float* luminance)
     std::fill_n(luminance, m_problem.samples.size() * m_problem.channels.size(), 0.0f);
     m_beyond_share = 0.0;
     m_mean_sources = 0.0;
-    if (m_basis.moments() == 0)
+    if (m_basis.lanes.moments() == 0)
         return;
     const std::size_t items = (m_tree.leaves() + leaves_at_once - 1) / leaves_at_once;
     std::vector<Areas> areas(items);
@@ -233,8 +233,10 @@ void SurfaceField::solve(Progress& progress, float* luminance)
         const SurfaceTree::Opening opening = m_problem.is_direct ? SurfaceTree::Opening{} : find_opening();
         parallel_for(items, [&](std::size_t item) {
             SurfaceTree::Sources& sources = m_sources.local();
-            const std::size_t end = std::min(m_tree.leaves(), (item + 1) * leaves_at_once);
-            for (std::size_t leaf = item * leaves_at_once; leaf < end; ++leaf)
+            const std::size_t begin = item * leaves_at_once;
+            const std::size_t end = std::min(m_tree.leaves(), begin + leaves_at_once);
+            m_tree.find_candidates(begin, end, opening, m_tables.reach, sources);
+            for (std::size_t leaf = begin; leaf < end; ++leaf)
                 pairs[item] += solve_leaf(leaf, opening, sources, [&](std::size_t sample, const Exitance& exitance) {
                     store(sample, exitance, areas[item], luminance);
                 });
@@ -261,7 +263,9 @@ SurfaceTree::Opening SurfaceField::find_opening()
     const auto probe = [&](const SurfaceTree::Opening& opening) {
         std::vector<Exitances> found(leaves.size());
         parallel_for(leaves.size(), [&](std::size_t i) {
-            solve_leaf(leaves[i], opening, m_sources.local(),
+            SurfaceTree::Sources& sources = m_sources.local();
+            m_tree.find_candidates(leaves[i], leaves[i] + 1, opening, m_tables.reach, sources);
+            solve_leaf(leaves[i], opening, sources,
                        [&](std::size_t, const Exitance& exitance) { found[i].push_back(exitance.sums); });
         });
         return found;
@@ -277,9 +281,9 @@ SurfaceTree::Opening SurfaceField::find_opening()
     const std::vector<Exitances> first = probe({probing_size, 0, {}});
     std::vector<double> bound(m_tables.point->light.rows);
     std::array<double, max_results> brightest{};
-    for (std::size_t r = 0; r < m_tables.results; ++r) {
+    for (std::size_t r = 0; r < m_tables.lanes.results; ++r) {
         brightest[r] = largest(r, first, nullptr);
-        const double scale = static_cast<double>(m_tree.set_scales()[m_tables.set[r]]);
+        const double scale = static_cast<double>(m_tree.set_scales()[m_basis.terms.sets.results[r].set]);
         if (brightest[r] == 0.0 || scale == 0.0)
             continue;
         const std::vector<double> bends = m_tables.second_derivatives(r);
@@ -296,7 +300,7 @@ SurfaceTree::Opening SurfaceField::find_opening()
             opening.bound.push_back(static_cast<float>(value / (share * m_problem.tolerance)));
         found[i % 3] = probe(opening);
         bool is_enough = i >= 2;
-        for (std::size_t r = 0; r < m_tables.results && i >= 2; ++r) {
+        for (std::size_t r = 0; r < m_tables.lanes.results && i >= 2; ++r) {
             const double change = largest(r, found[(i - 2) % 3], &found[i % 3]);
             is_enough = is_enough && change <= probed_fraction * m_problem.tolerance * brightest[r];
         }
@@ -306,7 +310,7 @@ SurfaceTree::Opening SurfaceField::find_opening()
     return {};
 }
 
-// Returns the number of pairs.
+// Returns the number of pairs. `sources` has the candidates.
 std::size_t SurfaceField::solve_leaf(std::size_t leaf, const SurfaceTree::Opening& opening,
                                      SurfaceTree::Sources& sources,
                                      const std::function<void(std::size_t, const Exitance&)>& store_exitance) const
@@ -317,12 +321,7 @@ std::size_t SurfaceField::solve_leaf(std::size_t leaf, const SurfaceTree::Openin
         targets.add(m_problem.samples[i].position, m_problem.samples[i].normal, i);
     std::array<float, PairTargets::most * max_results> sums{};
     std::array<float, PairTargets::most> beyond{};
-    const auto add = [&](std::span<const PairSource> pairs, bool are_clusters) {
-        add_pairs(m_tables, targets, pairs, are_clusters, m_moments.data(), m_basis.moments(), sums.data(),
-                  beyond.data());
-    };
-    add(sources.near, false);
-    add(sources.far, true);
+    add_pairs(m_tables, targets, sources, m_moments.data(), m_basis.lanes.moments(), sums.data(), beyond.data());
     for (std::size_t k = 0; k < targets.count; ++k) {
         Exitance exitance{{}, beyond[k]};
         std::copy_n(sums.begin() + static_cast<std::ptrdiff_t>(k * max_results), max_results, exitance.sums.begin());
@@ -330,7 +329,7 @@ std::size_t SurfaceField::solve_leaf(std::size_t leaf, const SurfaceTree::Openin
             add_self(targets.own[k], exitance.sums);
         store_exitance(targets.own[k], exitance);
     }
-    return targets.count * (sources.near.size() + sources.far.size());
+    return targets.count * sources.count();
 }
 
 // The surface goes on beyond the edge of a cut sample. Where light spreads less than a sample, that of its neighbors does
@@ -355,17 +354,14 @@ LatticeShape SurfaceField::lattice(std::size_t sample) const
 
 void SurfaceField::add_self(std::size_t sample, std::array<float, 3>& sums) const
 {
-    const LatticeShape shape = lattice(sample);
-    for (std::size_t r = 0; r < m_tables.results; ++r)
-        sums[r] += m_tables.self_light(
-            own_area(sample), shape, r,
-            m_moments.data() + sample * m_basis.moments() + m_tables.set[r] * 2 * m_basis.functions());
+    m_tables.add_self_light(own_area(sample), lattice(sample), m_moments.data() + sample * m_basis.lanes.moments(),
+                            sums.data());
 }
 
 void SurfaceField::store(std::size_t sample, const Exitance& exitance, Areas& areas, float* luminance) const
 {
     const std::size_t channels = m_problem.channels.size();
-    for (std::size_t r = 0; r < m_tables.results; ++r)
+    for (std::size_t r = 0; r < m_tables.lanes.results; ++r)
         for (const ChannelSets::Member& member : m_basis.terms.sets.results[r].members) {
             const double color = m_problem.is_colored ? 1.0 : m_color.empty() ? 0.0 : m_color[member.channel];
             luminance[sample * channels + member.channel] = std::max(

@@ -64,7 +64,7 @@ public:
     double mean_sources() const { return m_mean_sources; }
 
     // Bytes of a sample's moments.
-    std::size_t moment_bytes() const { return m_basis.moments() * sizeof(float); }
+    std::size_t moment_bytes() const { return m_basis.lanes.moments() * sizeof(float); }
 
     const SurfaceBasis& basis() const { return m_basis; }
 

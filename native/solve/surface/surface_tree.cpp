@@ -122,10 +122,10 @@ void add_turned(const SurfaceBasis& basis, const std::array<float, 2>& turned, f
         s = s * turned[0] + c * turned[1];
         c = next;
     }
-    for (std::size_t block = 0; block < basis.moments() / (2 * lanes_per_block); ++block) {
+    for (std::size_t block = 0; block < basis.lanes.moments() / (2 * lanes_per_block); ++block) {
         const float* from_sine = from + lanes_per_block;
         float* to_sine = to + lanes_per_block;
-        const std::int32_t* harmonic = basis.harmonic.data() + block % basis.blocks * lanes_per_block;
+        const std::int32_t* harmonic = basis.lanes.harmonic.data() + block % basis.lanes.blocks * lanes_per_block;
         for (std::size_t lane = 0; lane < lanes_per_block; ++lane) {
             const auto m = static_cast<std::size_t>(harmonic[lane]);
             to[lane] += cosines[m] * from[lane] - sines[m] * from_sine[lane];
@@ -223,12 +223,14 @@ std::uint32_t SurfaceTree::build(std::size_t begin, std::size_t end, bool is_in_
 
 void SurfaceTree::weigh(const SurfaceBasis& basis, const PairTables& tables, const std::vector<float>& moments)
 {
-    const std::size_t stride = basis.moments();
-    const std::size_t per_set = 2 * basis.functions();
-    const auto light = [&](std::size_t sample, std::size_t set) {
-        return std::abs(moments[sample * stride + set * per_set]);
-    };
+    const std::size_t stride = basis.lanes.moments();
     m_set_scales.assign(basis.terms.sets.count(), 0.0f);
+    std::vector<std::size_t> first(m_set_scales.size());  // [set] of the moments of the first function
+    for (std::size_t result = 0; result < basis.lanes.results; ++result)
+        first[basis.terms.sets.results[result].set] = basis.lanes.place(result, 0);
+    const auto light = [&](std::size_t sample, std::size_t set) {
+        return std::abs(moments[sample * stride + first[set]]);
+    };
     for (std::size_t set = 0; set < m_set_scales.size(); ++set) {
         float most = 0.0f;
         for (std::size_t i = 0; i < m_samples.size(); ++i)
@@ -237,8 +239,8 @@ void SurfaceTree::weigh(const SurfaceBasis& basis, const PairTables& tables, con
     }
     parallel_for(m_samples.size() / at_once + 1, [&](std::size_t item) {
         for (std::size_t i = item * at_once; i < std::min(m_samples.size(), (item + 1) * at_once); ++i) {
-            const float* first = moments.data() + i * stride;
-            const bool is_lit = std::any_of(first, first + stride, [](float value) { return value != 0.0f; });
+            const float* all = moments.data() + i * stride;
+            const bool is_lit = std::any_of(all, all + stride, [](float value) { return value != 0.0f; });
             float sum = 0.0f;
             for (std::size_t set = 0; set < m_set_scales.size(); ++set)
                 sum += m_set_scales[set] * light(i, set);
@@ -266,27 +268,51 @@ std::vector<std::size_t> SurfaceTree::probed_leaves(std::size_t bright, std::siz
     return leaves;
 }
 
+void SurfaceTree::list_lit()
+{
+    m_lit.clear();
+    m_lit_before.assign(1, 0);
+    for (const std::uint32_t i : m_order) {
+        if (m_weights[i] > 0.0f)
+            m_lit.push_back(m_samples[i].as_source(m_disks[i], i));
+        m_lit_before.push_back(static_cast<std::uint32_t>(m_lit.size()));
+    }
+}
+
+std::span<const PairSource> SurfaceTree::lit_samples(const Node& node) const
+{
+    const std::size_t first = m_lit_before[node.begin];
+    return std::span(m_lit).subspan(first, m_lit_before[node.end] - first);
+}
+
 void SurfaceTree::gather(const SurfaceBasis& basis, const PairTables& tables, std::vector<float>& moments)
 {
-    const std::size_t stride = basis.moments();
+    const std::size_t stride = basis.lanes.moments();
     const std::size_t count = m_samples.size();
     weigh(basis, tables, moments);
+    list_lit();
+    m_clusters.resize(m_nodes.size());
     const auto sums_of = [&](std::size_t node) { return moments.data() + (count + node) * stride; };
     std::fill(moments.begin() + static_cast<std::ptrdiff_t>(count * stride), moments.end(), 0.0f);
     parallel_for(m_nodes.size() / at_once + 1, [&](std::size_t item) {
         for (std::size_t i = item * at_once; i < std::min(m_nodes.size(), (item + 1) * at_once); ++i)
             if (m_nodes[i].second == 0)
-                gather_tip(basis, moments, m_nodes[i], sums_of(i));
+                gather_tip(basis, moments, i, sums_of(i));
     });
     for (std::size_t node = m_nodes.size(); node-- > 0;)
         if (m_nodes[node].second != 0)
-            gather_children(basis, moments, m_nodes[node], sums_of(node));
-    for (std::size_t node = 0; node < m_nodes.size(); ++node)
-        m_nodes[node].cluster.moments = static_cast<std::uint32_t>(count + node);
+            gather_children(basis, moments, node, sums_of(node));
+    for (std::size_t node = 0; node < m_nodes.size(); ++node) {
+        const ClusterSource& cluster = m_clusters[node];
+        m_clusters[node].moments = static_cast<std::uint32_t>(count + node);
+        m_nodes[node].light = cluster.position;
+        m_nodes[node].spread = 4.0f * cluster.spread;
+        m_nodes[node].variance = 1.0f - glm::dot(cluster.normal, cluster.normal);
+    }
 }
 
 // Sets weight, place and frame of a node from the light of its parts; false if all are dark.
-bool SurfaceTree::place(Node& node, std::span<const Part> parts)
+bool SurfaceTree::place(Node& node, ClusterSource& cluster, std::span<const Part> parts)
 {
     Vec3f position(0.0f);
     Vec3f normal(0.0f);
@@ -299,21 +325,23 @@ bool SurfaceTree::place(Node& node, std::span<const Part> parts)
     node.light_radius = 0.0f;
     if (node.weight == 0.0f)
         return false;
-    node.cluster.area = 1.0f;
-    node.cluster.position = node.middle + position / node.weight;
-    set_frame(normal / node.weight, node.cluster);
+    cluster.area = 1.0f;
+    cluster.position = node.middle + position / node.weight;
+    set_frame(normal / node.weight, cluster);
     return true;
 }
 
-void SurfaceTree::gather_tip(const SurfaceBasis& basis, const std::vector<float>& moments, Node& node, float* sums)
+void SurfaceTree::gather_tip(const SurfaceBasis& basis, const std::vector<float>& moments, std::size_t number,
+                             float* sums)
 {
+    Node& node = m_nodes[number];
+    ClusterSource& cluster = m_clusters[number];
     const auto samples = std::span(m_order).subspan(node.begin, node.end - node.begin);
     std::array<Part, tip_size> parts;
     for (std::size_t k = 0; k < samples.size(); ++k)
         parts[k] = {m_weights[samples[k]], m_samples[samples[k]].position, m_samples[samples[k]].normal};
-    if (!place(node, std::span(parts).first(samples.size())))
+    if (!place(node, cluster, std::span(parts).first(samples.size())))
         return;
-    PairSource& cluster = node.cluster;
     float square = 0.0f;
     float bend = 0.0f;
     cluster.squares.fill(0.0f);
@@ -331,60 +359,62 @@ void SurfaceTree::gather_tip(const SurfaceBasis& basis, const std::vector<float>
         for (std::size_t axis = 0; axis < 3; ++axis)
             cluster.squares[axis] += of_disk;
         add_squares(sample.normal, -of_disk, cluster.squares);
-        add_turned(basis, turn(cluster, sample.as_source(0, 0)), sample.area, moments.data() + i * basis.moments(),
-                   sums);
+        add_turned(basis, turn(cluster, sample.as_source(0, 0)), sample.area,
+                   moments.data() + i * basis.lanes.moments(), sums);
     }
     cluster.spread = 0.25f * square / node.weight;
     cluster.bend = bend / node.weight;
 }
 
-void SurfaceTree::gather_children(const SurfaceBasis& basis, const std::vector<float>& moments, Node& node, float* sums)
+void SurfaceTree::gather_children(const SurfaceBasis& basis, const std::vector<float>& moments, std::size_t number,
+                                  float* sums)
 {
-    const std::array<std::size_t, 2> children = {static_cast<std::size_t>(&node - m_nodes.data()) + 1, node.second};
+    Node& node = m_nodes[number];
+    ClusterSource& cluster = m_clusters[number];
+    const std::array<std::size_t, 2> children = {number + 1, node.second};
     std::array<Part, 2> parts;
-    for (std::size_t k = 0; k < 2; ++k) {
-        const Node& child = m_nodes[children[k]];
-        parts[k] = {child.weight, child.cluster.position, child.cluster.normal};
-    }
-    if (!place(node, parts))
+    for (std::size_t k = 0; k < 2; ++k)
+        parts[k] = {m_nodes[children[k]].weight, m_clusters[children[k]].position, m_clusters[children[k]].normal};
+    if (!place(node, cluster, parts))
         return;
-    PairSource& cluster = node.cluster;
     float spread = 0.0f;
     float bend = 0.0f;
     cluster.squares.fill(0.0f);
-    for (const std::size_t number : children) {
-        const Node& child = m_nodes[number];
+    for (const std::size_t number_of_child : children) {
+        const Node& child = m_nodes[number_of_child];
+        const ClusterSource& light = m_clusters[number_of_child];
         if (child.weight == 0.0f)
             continue;
-        const Vec3f offset = child.cluster.position - cluster.position;
-        spread += child.weight * (child.cluster.spread + 0.25f * glm::dot(offset, offset));
+        const Vec3f offset = light.position - cluster.position;
+        spread += child.weight * (light.spread + 0.25f * glm::dot(offset, offset));
         node.light_radius = std::max(node.light_radius, glm::length(offset) + child.light_radius);
-        bend += child.weight * (child.cluster.bend + glm::dot(offset, child.cluster.normal));
+        bend += child.weight * (light.bend + glm::dot(offset, light.normal));
         const float part = child.weight / node.weight;
         add_squares(offset, part, cluster.squares);
         for (std::size_t k = 0; k < cluster.squares.size(); ++k)
-            cluster.squares[k] += part * child.cluster.squares[k];
-        add_turned(basis, turn(cluster, child.cluster), 1.0f,
-                   moments.data() + (m_samples.size() + number) * basis.moments(), sums);
+            cluster.squares[k] += part * light.squares[k];
+        add_turned(basis, turn(cluster, light), 1.0f,
+                   moments.data() + (m_samples.size() + number_of_child) * basis.lanes.moments(), sums);
     }
     cluster.spread = spread / node.weight;
     cluster.bend = bend / node.weight;
 }
 
-void SurfaceTree::add_near(const Node& node, std::vector<PairSource>& near) const
+std::size_t SurfaceTree::Sources::count() const
 {
-    for (std::size_t i = node.begin; i < node.end; ++i)
-        if (const std::uint32_t sample = m_order[i]; m_weights[sample] > 0.0f)
-            near.push_back(m_samples[sample].as_source(m_disks[sample], sample));
+    std::size_t sum = clusters.size();
+    for (const std::span<const PairSource> near : samples)
+        sum += near.size();
+    return sum;
 }
 
+// A cluster that is far is so from farther away, too, but for steps of the bound.
 bool SurfaceTree::is_far(const Node& node, float distance, const Opening& opening)
 {
     if (distance <= 0.0f || node.light_radius > max_radius * distance)
         return false;
     const float square = distance * distance;
-    const float variance = 1.0f - glm::dot(node.cluster.normal, node.cluster.normal);
-    const float size = 4.0f * node.cluster.spread + normal_weight * variance * square;
+    const float size = node.spread + normal_weight * node.variance * square;
     if (opening.size > 0.0f)
         return size <= opening.size * opening.size * square;
     const std::uint32_t step = chord_step(distance - node.light_radius);
@@ -395,26 +425,63 @@ bool SurfaceTree::is_far(const Node& node, float distance, const Opening& openin
     return fourth * node.weight * opening.bound[row] <= 1.0f;
 }
 
+void SurfaceTree::find_candidates(std::size_t begin, std::size_t end, const Opening& opening, float reach,
+                                  Sources& sources) const
+{
+    // A ball around all targets.
+    Vec3f low(std::numeric_limits<float>::infinity());
+    Vec3f high = -low;
+    for (std::size_t leaf = begin; leaf < end; ++leaf) {
+        const Node& target = m_nodes[m_leaves[leaf]];
+        low = glm::min(low, target.middle - target.radius);
+        high = glm::max(high, target.middle + target.radius);
+    }
+    const Vec3f middle = 0.5f * (low + high);
+    const float radius = 0.5f * glm::length(high - low);
+    sources.candidates.clear();
+    sources.shared.clear();
+    sources.waiting.assign(1, 0);
+    while (!sources.waiting.empty()) {
+        const std::uint32_t number = sources.waiting.back();
+        sources.waiting.pop_back();
+        const Node& node = m_nodes[number];
+        const float distance = glm::length(node.light - middle);
+        if (node.weight == 0.0f || distance - radius - node.light_radius > reach)
+            continue;
+        if (is_far(node, distance - radius, opening)) {
+            sources.shared.push_back(&m_clusters[number]);
+            continue;
+        }
+        // A leaf stays whole: it may be one of the targets.
+        if (node.end - node.begin <= leaf_size || is_far(node, distance + radius, opening)) {
+            sources.candidates.push_back(number);
+        } else {
+            sources.waiting.push_back(node.second);
+            sources.waiting.push_back(number + 1);
+        }
+    }
+}
+
 void SurfaceTree::find(std::size_t leaf, const Opening& opening, float reach, Sources& sources) const
 {
-    sources.near.clear();
-    sources.far.clear();
+    sources.samples.clear();
+    sources.clusters = sources.shared;
     const Node& target = m_nodes[m_leaves[leaf]];
-    add_near(target, sources.near);
-    sources.waiting.assign(1, 0);
+    sources.samples.push_back(lit_samples(target));
+    sources.waiting.assign(sources.candidates.rbegin(), sources.candidates.rend());
     while (!sources.waiting.empty()) {
         const std::uint32_t number = sources.waiting.back();
         sources.waiting.pop_back();
         const Node& node = m_nodes[number];
         if (node.weight == 0.0f || number == m_leaves[leaf])
             continue;
-        const float distance = glm::length(node.cluster.position - target.middle) - target.radius;
+        const float distance = glm::length(node.light - target.middle) - target.radius;
         if (distance - node.light_radius > reach)
             continue;
         if (is_far(node, distance, opening)) {
-            sources.far.push_back(node.cluster);
+            sources.clusters.push_back(&m_clusters[number]);
         } else if (node.second == 0) {
-            add_near(node, sources.near);
+            sources.samples.push_back(lit_samples(node));
         } else {
             sources.waiting.push_back(node.second);
             sources.waiting.push_back(number + 1);

@@ -21,7 +21,7 @@ struct SurfaceSample {
 
     PairSource as_source(std::uint32_t disk, std::uint32_t moments) const
     {
-        return {position, area, normal, disk, tangent, moments, glm::cross(normal, tangent), 0.0f};
+        return {position, area, normal, disk, tangent, moments, glm::cross(normal, tangent)};
     }
 };
 
@@ -54,11 +54,13 @@ public:
     // nodes are written.
     void gather(const SurfaceBasis& basis, const PairTables& tables, std::vector<float>& moments);
 
-    // Light that reaches a leaf.
-    struct Sources {
-        std::vector<PairSource> near;  // samples; lit ones of the leaf itself come first, in their order
-        std::vector<PairSource> far;   // clusters
-        std::vector<std::uint32_t> waiting;  // working memory
+    // Light that reaches a leaf: its own lit samples come first.
+    struct Sources : PairSources {
+        std::size_t count() const;
+
+        std::vector<const ClusterSource*> shared;  // clusters that are far from all leaves side by side
+        std::vector<std::uint32_t> candidates;     // nodes that may be sources of some of these
+        std::vector<std::uint32_t> waiting;        // working memory
     };
 
     // Decides which clusters are far: those of which the light's squared size, of positions and normals, is small enough
@@ -70,7 +72,12 @@ public:
                                    // its squared distance); empty: none is far
     };
 
-    // Finds the sources of a leaf; light from beyond `reach` (metres) is left out.
+    // Finds the nodes among which `find` looks for the sources of leaves [begin, end), side by side; light from beyond
+    // `reach` (metres) is left out.
+    void find_candidates(std::size_t begin, std::size_t end, const Opening& opening, float reach,
+                         Sources& sources) const;
+
+    // Finds the sources of one of these leaves.
     void find(std::size_t leaf, const Opening& opening, float reach, Sources& sources) const;
 
 private:
@@ -80,9 +87,11 @@ private:
         std::uint32_t second = 0;  // its second child; the first one follows the node. 0: a leaf
         float radius = 0.0f;       // of the samples around their middle, metres
         Vec3f middle{0.0f};
-        float light_radius = 0.0f;  // of the lit samples around the cluster's position
+        float light_radius = 0.0f;  // of the lit samples around the light's position, metres
+        Vec3f light{0.0f};          // position of the cluster
         float weight = 0.0f;        // of its light; 0: dark
-        PairSource cluster{};
+        float spread = 0.0f;        // mean squared distance of the light from its position, m^2
+        float variance = 0.0f;      // of the normals
     };
 
     // Light of a part of a cluster.
@@ -92,18 +101,22 @@ private:
         Vec3f normal;  // mean of unit vectors
     };
 
-    static bool place(Node& node, std::span<const Part> parts);
+    static bool place(Node& node, ClusterSource& cluster, std::span<const Part> parts);
     static bool is_far(const Node& node, float distance, const Opening& opening);
     void weigh(const SurfaceBasis& basis, const PairTables& tables, const std::vector<float>& moments);
     std::uint32_t build(std::size_t begin, std::size_t end, bool is_in_leaf);
-    void gather_tip(const SurfaceBasis& basis, const std::vector<float>& moments, Node& node, float* sums);
-    void gather_children(const SurfaceBasis& basis, const std::vector<float>& moments, Node& node, float* sums);
-    void add_near(const Node& node, std::vector<PairSource>& near) const;
+    void list_lit();
+    void gather_tip(const SurfaceBasis& basis, const std::vector<float>& moments, std::size_t number, float* sums);
+    void gather_children(const SurfaceBasis& basis, const std::vector<float>& moments, std::size_t number, float* sums);
+    std::span<const PairSource> lit_samples(const Node& node) const;
 
     std::span<const SurfaceSample> m_samples;
     std::vector<std::uint64_t> m_codes;  // of `m_order`
     std::vector<std::uint32_t> m_order;  // numbers of the samples
     std::vector<Node> m_nodes;  // parents come before their children
+    std::vector<ClusterSource> m_clusters;  // [node]
+    std::vector<PairSource> m_lit;          // lit samples in the tree's order
+    std::vector<std::uint32_t> m_lit_before;  // [place in the tree's order] number of lit samples before
     std::vector<std::uint32_t> m_leaves;
     std::vector<float> m_set_scales;
     std::vector<float> m_weights;       // [sample] of its light; 0: dark
