@@ -110,7 +110,7 @@ class ObjectDigests:
             self.lamps += self._lamp(obj, matrix)
         elif obj.type in (SOLID_TYPES if self._bounces else SURFACE_TYPES):
             casts = all(owner.visible_shadow for owner in (obj, instancer) if owner is not None)
-            looks = self._looks(slot.material for slot in obj.material_slots)
+            looks = self._looks(_shown_materials(obj))
             links = self._links(obj) if is_lit and any(text for _, text in looks) else []
             number = _number(self._shape(obj), _rows(matrix), casts, links)
             self._instances[obj.name].append(_Instance(number, looks))
@@ -234,6 +234,20 @@ def _content(obj) -> str:
     if obj.type == "LIGHT":
         return digest(read_lamp(obj, Matrix()))
     return digest(obj.type, digest_of_mesh(obj) if obj.type == "MESH" else "")
+
+
+def _shown_materials(obj) -> list:
+    """The materials of an object's slots, without empty ones at the end that no face has."""
+    materials = [slot.material for slot in obj.material_slots]
+    if not any(materials):
+        return []
+    if materials[-1] is None and obj.type == "MESH":
+        indices = np.zeros(len(obj.data.polygons), np.int32)
+        obj.data.polygons.foreach_get("material_index", indices)
+        last = int(indices.max(initial=0))
+        while materials[-1] is None and last < len(materials) - 1:
+            materials.pop()
+    return materials
 
 
 def _number(*values) -> int:
