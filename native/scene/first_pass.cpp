@@ -5,6 +5,8 @@
 #include <cmath>
 #include <numbers>
 
+#include "base/threads.h"
+
 namespace beamspread {
 
 namespace {
@@ -30,7 +32,8 @@ FirstPass::FirstPass(std::size_t width, std::size_t height, std::size_t first_ra
       m_first_rays(first_rays),
       m_max_rays(rays),
       m_texels(width * height),
-      m_search(width, height, rays, seed)
+      m_search(width, height, rays, seed),
+      m_texel_search(width, height, seed)
 {
 }
 
@@ -46,6 +49,33 @@ void FirstPass::note(std::size_t x, std::size_t y, std::span<const std::uint8_t>
         sum.irradiance += rays[i].irradiance;
     }
     m_search.note(x, y, sum, hits);
+}
+
+void FirstPass::search(const ProbeLight& probe)
+{
+    m_search.spread(probe);
+    const std::vector<std::size_t> tiles = m_search.find_hard_tiles();
+    if (tiles.empty())
+        return;
+    // Other tiles with hits around keep their guides.
+    std::vector<std::uint8_t> is_hard(m_search.columns() * ((m_height + tile_side - 1) / tile_side));
+    for (const std::size_t tile : tiles)
+        is_hard[tile] = true;
+    std::vector<std::uint8_t> allowed(m_width * m_height);
+    parallel_for(m_height, [&](std::size_t y) {
+        for (std::size_t x = 0; x < m_width; ++x) {
+            const RayMethod method = method_of(around(x, y).met, x, y);
+            allowed[y * m_width + x] =
+                method == RayMethod::single ||
+                (method == RayMethod::guided && is_hard[y / tile_side * m_search.columns() + x / tile_side]);
+        }
+    });
+    m_texel_search.spread(
+        tiles, allowed,
+        [this](std::size_t column, std::size_t row, LightGuide& guide) {
+            m_search.find_guide(column * tile_side, row * tile_side, guide);
+        },
+        probe);
 }
 
 FirstPass::Around FirstPass::around(std::size_t x, std::size_t y) const
@@ -76,7 +106,8 @@ RayMethod FirstPass::method_of(std::uint8_t met_around, std::size_t x, std::size
         case Met::both:
             return m_search.is_rare(x, y) && m_search.has_hits_around(x, y) ? RayMethod::guided : RayMethod::even;
         default:
-            return m_search.has_hits_around(x, y) ? RayMethod::guided : RayMethod::single;
+            return m_search.has_hits_around(x, y) || m_texel_search.has_guide(x, y) ? RayMethod::guided
+                                                                                    : RayMethod::single;
     }
 }
 
@@ -131,6 +162,10 @@ void FirstPass::Row::find(const FirstPass& pass, std::size_t y)
 
 const LightGuide& FirstPass::Row::guide(std::size_t x)
 {
+    if (m_pass->m_texel_search.has_guide(x, m_y)) {
+        m_pass->m_texel_search.find_guide(x, m_y, m_texel_guide);
+        return m_texel_guide;
+    }
     LightGuide& guide = m_guides[x / tile_side];
     if (guide.empty())
         m_pass->m_search.find_guide(x, m_y, guide);

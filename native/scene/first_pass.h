@@ -8,6 +8,7 @@
 
 #include "scene/light_guide.h"
 #include "scene/light_search.h"
+#include "scene/texel_search.h"
 
 namespace beamspread {
 
@@ -39,7 +40,7 @@ public:
               std::span<const LightHit> hits);
 
     // Searches for rare light once all rays are noted.
-    void search(const ProbeLight& probe) { m_search.spread(probe); }
+    void search(const ProbeLight& probe);
 
     // Methods of a row of texels, and the guides of its tiles, for one thread.
     class Row {
@@ -56,6 +57,7 @@ public:
         std::vector<RayMethod> m_methods;
         std::vector<std::size_t> m_rays;
         std::vector<LightGuide> m_guides;  // [tile] of a row of tiles; empty until one is asked for
+        LightGuide m_texel_guide;          // of the texel last asked for
     };
 
 private:
@@ -80,6 +82,7 @@ private:
     std::size_t m_width, m_height, m_first_rays, m_max_rays;
     std::vector<Texel> m_texels;
     LightSearch m_search;
+    TexelSearch m_texel_search;
 };
 
 }  // namespace beamspread

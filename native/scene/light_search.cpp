@@ -28,6 +28,12 @@ constexpr std::size_t hits_of_neighbor = 16;
 // Fraction of rays of the first pass that get through, above which even rays have less noise than guided ones.
 constexpr double max_rare_share = 0.2;
 
+// Tiles are hard if less than this fraction of the rays of their last search, and fewer than `first_hits` of their first
+// pass, have found light, and if this fraction of the light of all lit tiles arrives there or beside them. More and less:
+// fewer dark texels, in a longer time.
+constexpr double max_hard_share = 0.3;
+constexpr double min_hard_brightness = 0.1;
+
 // Separates the random numbers of a search from those of other rays.
 constexpr std::uint32_t search_seed = 0x9e3779b9u;
 
@@ -36,6 +42,12 @@ constexpr std::uint32_t search_seed = 0x9e3779b9u;
 bool LightSearch::Tile::is_rare() const
 {
     return static_cast<double>(arrived) < max_rare_share * static_cast<double>(traced);
+}
+
+bool LightSearch::Tile::is_hard(std::size_t search_rays) const
+{
+    return searches > 0 && arrived < first_hits &&
+           static_cast<double>(found) < max_hard_share * static_cast<double>(search_rays);
 }
 
 // Keeps hits until there are enough; later ones replace as many as a row's share.
@@ -142,7 +154,7 @@ bool LightSearch::is_due(std::size_t tile) const
     return has_news;
 }
 
-std::vector<LightHit> LightSearch::search(std::size_t tile, const ProbeLight& probe) const
+LightSearch::Found LightSearch::search(std::size_t tile, const ProbeLight& probe) const
 {
     LightGuide guide;
     std::vector<LightHit> hits = hits_around(tile);
@@ -174,7 +186,7 @@ std::vector<LightHit> LightSearch::search(std::size_t tile, const ProbeLight& pr
             ends.push_back(total += 1.0 / densities[i]);
         }
     if (hits.size() <= max_hits)
-        return hits;
+        return {hits, hits.size(), total / static_cast<double>(m_search_rays)};
     std::vector<LightHit> kept;
     for (std::size_t i = 0, k = 0; i < max_hits; ++i) {
         const double at = (static_cast<double>(i) + 0.5) / max_hits * total;
@@ -182,7 +194,7 @@ std::vector<LightHit> LightSearch::search(std::size_t tile, const ProbeLight& pr
             ++k;
         kept.push_back(hits[k]);
     }
-    return kept;
+    return {kept, hits.size(), total / static_cast<double>(m_search_rays)};
 }
 
 void LightSearch::spread(const ProbeLight& probe)
@@ -195,15 +207,17 @@ void LightSearch::spread(const ProbeLight& probe)
                 due.push_back(i);
         if (due.empty())
             return;
-        std::vector<std::vector<LightHit>> hits(due.size());
-        parallel_for(due.size(), [&](std::size_t k) { hits[k] = search(due[k], probe); });
+        std::vector<Found> found(due.size());
+        parallel_for(due.size(), [&](std::size_t k) { found[k] = search(due[k], probe); });
         for (Tile& tile : m_tiles)
             tile.has_news = false;
         for (std::size_t k = 0; k < due.size(); ++k) {
             Tile& tile = m_tiles[due[k]];
             ++tile.searches;
-            tile.has_news = !hits[k].empty();
-            tile.keep(hits[k]);
+            tile.found = found[k].count;
+            tile.visible = found[k].visible;
+            tile.has_news = found[k].count > 0;
+            tile.keep(found[k].hits);
         }
     }
 }
@@ -219,6 +233,35 @@ void LightSearch::find_mean()
         }
     if (lit > 0)
         m_mean = sum / static_cast<double>(lit);
+}
+
+std::vector<std::size_t> LightSearch::find_hard_tiles() const
+{
+    double open = 0.0, irradiance = 0.0;
+    std::size_t lit = 0;
+    for (const Tile& tile : m_tiles) {
+        open += tile.open;
+        irradiance += tile.irradiance;
+        lit += !tile.hits.empty();
+    }
+    if (lit == 0 || irradiance >= max_rare_share * open)
+        return {};
+    const double wanted = min_hard_brightness * irradiance / static_cast<double>(lit);
+    std::vector<std::uint8_t> is_hard(m_tiles.size());
+    for (std::size_t i = 0; i < m_tiles.size(); ++i) {
+        if (!m_tiles[i].is_hard(m_search_rays))
+            continue;
+        // What a tile has found may be little for want of a guide: one beside it tells as well.
+        double brightest = 0.0;
+        visit_around(i, [&](std::size_t k) { brightest = std::max(brightest, m_tiles[k].brightness()); });
+        if (brightest >= wanted)
+            visit_around(i, [&](std::size_t k) { is_hard[k] = true; });
+    }
+    std::vector<std::size_t> tiles;
+    for (std::size_t i = 0; i < m_tiles.size(); ++i)
+        if (is_hard[i] && has_hits_around(i % m_columns * tile_side, i / m_columns * tile_side))
+            tiles.push_back(i);
+    return tiles;
 }
 
 bool LightSearch::has_hits_around(std::size_t x, std::size_t y) const

@@ -1,6 +1,7 @@
 // Search for light that few rays find, as through a window: by tiles of texels, from those that have found some.
 #pragma once
 
+#include <algorithm>
 #include <cstddef>
 #include <cstdint>
 #include <functional>
@@ -49,6 +50,10 @@ public:
     // True if few rays from the tile of a texel get through, so that guided rays have less noise.
     bool is_rare(std::size_t x, std::size_t y) const { return tile_of(x, y).is_rare(); }
 
+    // Where little of a light arrives anywhere: tiles whose guides may miss the light of some texels, and those beside
+    // them, if they have hits around.
+    std::vector<std::size_t> find_hard_tiles() const;
+
     // True if the tile of texel (x, y) or one of its neighbors has a hit.
     bool has_hits_around(std::size_t x, std::size_t y) const;
 
@@ -63,9 +68,15 @@ private:
         double irradiance = 0.0;              // mean of texels and channels, W/m^2
         double open = 0.0;                    // the same if nothing blocked the light
         int searches = 0;
+        std::size_t found = 0;  // hits of the last search, before some of them are kept
+        double visible = 0.0;   // part of the light that arrives, by the last search
         bool has_news = false;  // hits that its neighbors have not used
 
         bool is_rare() const;
+        // True if its guide may miss the light of some texels.
+        bool is_hard(std::size_t search_rays) const;
+        // Irradiance by the first pass or the last search, W/m^2.
+        double brightness() const { return std::max(irradiance, visible * open); }
         void keep_first(std::span<const LightHit> new_hits);
         void keep(std::span<const LightHit> new_hits);
     };
@@ -79,7 +90,13 @@ private:
     std::vector<LightHit> hits_around(std::size_t tile) const;
     static int max_searches_of(const Tile& tile);
     bool is_due(std::size_t tile) const;
-    std::vector<LightHit> search(std::size_t tile, const ProbeLight& probe) const;
+    // Hits of a search that may be kept, the number of all, and the part of the light that arrives.
+    struct Found {
+        std::vector<LightHit> hits;
+        std::size_t count = 0;
+        double visible = 0.0;
+    };
+    Found search(std::size_t tile, const ProbeLight& probe) const;
     void find_mean();
 
     std::size_t m_width, m_height, m_columns, m_rows;

@@ -102,27 +102,28 @@ def slit(width=0.02):
     return glowing, native.Occluders(screen), exact
 
 
-# Light, exact irradiance; allowed errors of the total and of blocks, and fraction of texels that may find nothing.
+# Light, exact irradiance; allowed errors of the total and of blocks.
 CASES = {
-    "keyhole .04 m": (hole(0.04), 0.02, 0.04, 0.03),
-    "hole .06 m": (hole(0.06), 0.01, 0.02, 0.015),
-    "hole .1 m": (hole(0.1), 0.01, 0.01, 0.001),
-    "hole .25 m": (hole(0.25), 0.005, 0.01, 0.001),
-    "hole .6 m": (hole(0.6), 0.005, 0.01, 0.001),
-    "window": (window(), 0.005, 0.01, 0.001),
-    "slit": (slit(), 0.02, 0.04, 0.01),
+    "keyhole .02 m": (hole(0.02), 0.01, 0.02),
+    "keyhole .04 m": (hole(0.04), 0.01, 0.02),
+    "hole .06 m": (hole(0.06), 0.005, 0.01),
+    "hole .1 m": (hole(0.1), 0.005, 0.01),
+    "hole .25 m": (hole(0.25), 0.005, 0.01),
+    "hole .6 m": (hole(0.6), 0.005, 0.01),
+    "window": (window(), 0.005, 0.01),
+    "slit": (slit(), 0.01, 0.02),
 }
 
 
 @pytest.mark.parametrize("name", CASES)
 def test_no_light_is_lost_behind_an_opening(name):
-    """Total and L1 of blocks. Few texels find nothing: below the smallest hole, and at borders of tiles."""
-    (light, casters, exact), of_total, of_blocks, black = CASES[name]
+    """Total and L1 of blocks; each texel finds some of its light."""
+    (light, casters, exact), of_total, of_blocks = CASES[name]
     wanted = mean_over_texels(exact)
     got = native.gather_rays(receiver(), light, casters, **RAYS, seed=1)[0].mean(axis=2)
     assert got.sum() == pytest.approx(wanted.sum(), rel=of_total)
     assert abs(blocks(got) - blocks(wanted)).sum() < of_blocks * blocks(wanted).sum()
-    assert (got[wanted > 1e-3 * wanted.max()] == 0).mean() < black
+    assert not (got[wanted > 1e-3 * wanted.max()] == 0).any()
 
 
 def test_light_through_a_keyhole_has_no_bias():
@@ -197,7 +198,8 @@ def test_noise_that_is_reported_is_that_of_the_image():
     assert 0.6 * reported[0] < noise < 1.1 * reported[0]
 
 
-def test_light_through_gaps_is_the_same_for_any_number_of_threads():
-    light, casters, _ = hole(0.1)
+@pytest.mark.parametrize("width", [0.02, 0.1])
+def test_light_through_gaps_is_the_same_for_any_number_of_threads(width):
+    light, casters, _ = hole(width)
     one, three = (native.gather_rays(receiver(48), light, casters, **RAYS, threads=threads)[0] for threads in (1, 3))
     np.testing.assert_array_equal(one, three)
