@@ -180,7 +180,7 @@ def main(largest=1_000_000):
     print(f"LDFs of {len(curved.curvatures)} curvatures")
     growth(curved, [count for count in (10_000, 100_000, 1_000_000) if count < largest] + [largest])
     beside_fft(curved, min(largest, 1_000_000))
-    large(library(Medium(0.0, 1.5), "preview", curved=largest >= 10_000), min(largest, 512**2))
+    large(library(Medium(0.0, 1.5), curved=largest >= 10_000), min(largest, 512**2))
     errors(curved, min(largest, 20_000))
 
 

@@ -113,9 +113,9 @@ struct Rows {
     std::array<std::uint32_t, PairTargets::most> nearest;  // for derivatives, which are smooth and small
 };
 
-// `target` has positions, then normals.
+// False if the source is beyond reach of all targets. `target` has positions, then normals.
 template <class Source>
-[[gnu::always_inline]] inline void find_pairs(const PairTables& tables, const std::array<Floats, 6>& target,
+[[gnu::always_inline]] inline bool find_pairs(const PairTables& tables, const std::array<Floats, 6>& target,
                                               const Source& source, Pairs& pairs)
 {
     constexpr bool is_cluster = std::is_same_v<Source, ClusterSource>;
@@ -125,6 +125,12 @@ template <class Source>
     Floats chord = dx * dx + dy * dy + dz * dz;
     find_roots(chord);
     pairs.chord = chord;
+    const Integers is_reached = chord < tables.reach;
+    std::int32_t any_reached = 0;
+    for (std::size_t i = 0; i < PairTargets::most; ++i)
+        any_reached |= is_reached[i];
+    if (any_reached == 0)
+        return false;
     const ChordTable& point = tables.point->light;
     Integers first = Integers{} + static_cast<std::int32_t>(point.first);
     Integers last = first + static_cast<std::int32_t>(point.rows - 2);
@@ -180,6 +186,7 @@ template <class Source>
         const Floats to_z = pairs.sine * source.tangent.z - pairs.cosine * source.binormal.z;
         pairs.across = (by_x * to_x + by_y * to_y + by_z * to_z) * chord * half_fourth;
     }
+    return true;
 }
 
 // Index of the node before each curvature, and the part of the way to the next.
@@ -285,7 +292,8 @@ template <std::size_t most_groups, class Source>
     all_blocks.fill(static_cast<std::uint8_t>(tables.lanes.blocks));
     Pairs pairs;
     std::array<Rows, most_groups> rows;
-    find_pairs(tables, target, source, pairs);
+    if (!find_pairs(tables, target, source, pairs))
+        return;
     const Integers is_beyond = (pairs.curvature < tables.least_curvature) | (pairs.curvature > tables.most_curvature);
     const BlockCounts most =
         is_cluster || !has_disk(pairs, targets.count) ? point_blocks[least_step(pairs, targets.count)] : all_blocks;
