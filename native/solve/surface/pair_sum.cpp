@@ -246,7 +246,7 @@ template <class Source>
     std::memcpy(rows.first.data(), &first, sizeof(first));
     std::memcpy(rows.to_high.data(), &to_high, sizeof(to_high));
     if (is_cluster) {
-        const Integers nearest = first + ((pairs.part > 0.5f) & Integers{} + lanes) + ((to_next > 0.5f) & to_high);
+        const Integers nearest = first + ((pairs.part > 0.5f) & (Integers{} + lanes)) + ((to_next > 0.5f) & to_high);
         std::memcpy(rows.nearest.data(), &nearest, sizeof(nearest));
     }
     rows.weight = {(1.0f - to_next) * (1.0f - pairs.part), (1.0f - to_next) * pairs.part, to_next * (1.0f - pairs.part),
@@ -317,7 +317,8 @@ template <std::size_t most_groups, class Source>
             continue;
         const ChordTable& table = is_disk ? tables.disks[source.disk]->light : tables.point->light;
         const float weight = source.area * pairs.per_square[i];
-        Harmonics8 real, imaginary;
+        Harmonics8 real{};
+        Harmonics8 imaginary{};
         if (bits > 1) {
             powers(pairs.cosine[i], pairs.sine[i], bits, real, imaginary);
             real *= weight;
