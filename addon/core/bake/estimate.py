@@ -52,7 +52,7 @@ ADAPTIVE, DIRECT = (1e-6, 3e-6), (0.2e-9, 30e-9)
 
 # Seconds of the solution on surfaces that bend: in any case, for the tables of its media; and for each piece of a texel
 # with a mean free path of a texel, and each channel of its own there. They grow with this power of the path.
-BENT, BENT_TEXEL, BENT_CHANNEL, BENT_POWER = 2.2, 6e-6, 14e-6, 0.55
+BENT, BENT_TEXEL, BENT_CHANNEL, BENT_POWER = 1.6, 4.5e-6, 10.5e-6, 0.55
 # Part of a surface that bends that lamps and suns light, about.
 LIT_BY_LAMPS = 0.5
 
