@@ -33,7 +33,7 @@ FirstPass::FirstPass(std::size_t width, std::size_t height, std::size_t first_ra
       m_max_rays(rays),
       m_texels(width * height),
       m_search(width, height, rays, seed),
-      m_texel_search(width, height, seed)
+      m_texel_search(width, height, rays, seed)
 {
 }
 
@@ -51,9 +51,9 @@ void FirstPass::note(std::size_t x, std::size_t y, std::span<const std::uint8_t>
     m_search.note(x, y, sum, hits);
 }
 
-void FirstPass::search(const ProbeLight& probe)
+void FirstPass::search(const ProbeLight& probe, Progress& progress)
 {
-    m_search.spread(probe);
+    m_search.spread(probe, progress);
     const std::vector<std::size_t> tiles = m_search.find_hard_tiles();
     if (tiles.empty())
         return;
@@ -75,7 +75,7 @@ void FirstPass::search(const ProbeLight& probe)
         [this](std::size_t column, std::size_t row, LightGuide& guide) {
             m_search.find_guide(column * tile_side, row * tile_side, guide);
         },
-        probe);
+        probe, progress);
 }
 
 FirstPass::Around FirstPass::around(std::size_t x, std::size_t y) const

@@ -40,7 +40,7 @@ public:
               std::span<const LightHit> hits);
 
     // Searches for rare light once all rays are noted.
-    void search(const ProbeLight& probe);
+    void search(const ProbeLight& probe, Progress& progress);
 
     // Methods of a row of texels, and the guides of its tiles, for one thread.
     class Row {

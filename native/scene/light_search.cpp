@@ -197,7 +197,7 @@ LightSearch::Found LightSearch::search(std::size_t tile, const ProbeLight& probe
     return {kept, hits.size(), total / static_cast<double>(m_search_rays)};
 }
 
-void LightSearch::spread(const ProbeLight& probe)
+void LightSearch::spread(const ProbeLight& probe, Progress& progress)
 {
     find_mean();
     while (true) {
@@ -208,7 +208,10 @@ void LightSearch::spread(const ProbeLight& probe)
         if (due.empty())
             return;
         std::vector<Found> found(due.size());
-        parallel_for(due.size(), [&](std::size_t k) { found[k] = search(due[k], probe); });
+        parallel_for(due.size(), [&](std::size_t k) {
+            found[k] = search(due[k], probe);
+            progress.advance(0.0);
+        });
         for (Tile& tile : m_tiles)
             tile.has_news = false;
         for (std::size_t k = 0; k < due.size(); ++k) {
@@ -251,7 +254,7 @@ std::vector<std::size_t> LightSearch::find_hard_tiles() const
     for (std::size_t i = 0; i < m_tiles.size(); ++i) {
         if (!m_tiles[i].is_hard(m_search_rays))
             continue;
-        // What a tile has found may be little for want of a guide: one beside it tells as well.
+        // A tile may have found little for want of a guide, so those beside it count as well.
         double brightest = 0.0;
         visit_around(i, [&](std::size_t k) { brightest = std::max(brightest, m_tiles[k].brightness()); });
         if (brightest >= wanted)

@@ -8,6 +8,7 @@
 #include <span>
 #include <vector>
 
+#include "base/progress.h"
 #include "base/sobol.h"
 #include "scene/light_guide.h"
 
@@ -41,7 +42,7 @@ public:
     void note(std::size_t x, std::size_t y, const FirstRays& rays, std::span<const LightHit> hits);
 
     // Traces rays around hits from tiles that see little light, and goes on in their neighbors until no tile finds more.
-    void spread(const ProbeLight& probe);
+    void spread(const ProbeLight& probe, Progress& progress);
 
     // Irradiance of the tile of texel (x, y) if nothing blocked the light, relative to the mean of tiles that see light in
     // the first pass; known after `spread`.

@@ -73,7 +73,8 @@ public:
             progress.advance(static_cast<double>(end - i * rows));
         });
         m_first_pass->search([this](std::span<const Vec2> positions, std::span<const Vec2> places,
-                                    std::uint8_t* arrives) { probe(positions, places, arrives); });
+                                    std::uint8_t* arrives) { probe(positions, places, arrives); },
+                             progress);
     }
 
     void gather_row(std::size_t y, RaySink& sink)

@@ -14,6 +14,7 @@ from beamspread.blender.jobs.state import Run, state
 from beamspread.blender.live import timer
 from beamspread.blender.node.find import find_targets
 from beamspread.core.bake.bounced import BouncedLight
+from beamspread.core.bake.estimate import SKY
 from beamspread.core.bake.forecast import Finders, seconds_of
 from beamspread.core.bake.pace import pace
 from beamspread.core.bake.surroundings import OPEN
@@ -23,7 +24,17 @@ from beamspread.core.target import Target
 from mathutils import Matrix
 from nodes import Nodes
 from panel_layout import panel
-from scenes import add_lamp, add_material, add_plane, add_sun, add_world, diffuse_material, glowing_material, select
+from scenes import (
+    add_lamp,
+    add_material,
+    add_mesh,
+    add_plane,
+    add_sun,
+    add_world,
+    diffuse_material,
+    glowing_material,
+    select,
+)
 
 
 @pytest.fixture(autouse=True)
@@ -255,6 +266,22 @@ def test_rays_are_announced_where_obstacles_are_alone():
     assert covered == 0
     (plan,) = read_scene(bpy.context, [name_of])
     assert plan.bake(bpy.context.scene.beamspread.for_bake()).job.surroundings.shares == ({"Lamp": 0.0},)
+
+
+def test_faces_without_area_have_no_place_below_a_sky():
+    corners = [(-1, -1, 0), (1, -1, 0), (1, 1, 0), (-1, 1, 0), (0, -1, 0)]
+    uvs = [(0, 0), (1, 0), (1, 1), (0, 1), (0, 0), (0.5, 0), (1, 0)]
+    floor = add_mesh("Floor", corners, [(0, 1, 2, 3), (0, 4, 1)], uvs=uvs)
+    floor.data.materials.append(add_material())
+    add_plane("Card", (1, 1), Matrix.Translation((0, 0, 1)))
+    add_world()
+    (name,) = find_targets([floor])
+    stale.refresh(bpy.context)
+    assert 0 < state.announced[name].around.shares[0][SKY] <= 1
+    floor.scale = 1, 1, 0
+    bpy.context.view_layer.update()
+    stale.refresh(bpy.context)
+    assert name in state.announced
 
 
 @pytest.mark.parametrize(("width", "share"), [(0.2, (0.9, 1.0)), (0.0, (0.0, 0.0))])

@@ -189,6 +189,23 @@ def test_an_empty_slot_counts_once_a_face_has_it():
     assert row(Target("Plane", "Medium")).status == Status.STALE
 
 
+def test_edit_mode_is_no_change_of_an_object_with_an_empty_slot():
+    """The evaluated mesh has no polygons then."""
+    bpy.context.scene.beamspread.use_indirect = True
+    plane = add_plane("Plane", material=add_material())
+    add_sun(20)
+    wall = add_plane("Wall of an empty slot", matrix=Matrix.Translation((3, 0, 1)))
+    for material in (add_material("Second"), None):
+        wall.data.materials.append(material)
+    wall.data.polygons[0].material_index = 1
+    bake(plane)
+    bpy.context.view_layer.objects.active = wall
+    for mode in ("EDIT", "OBJECT"):
+        bpy.ops.object.mode_set(mode=mode)
+        update()
+        assert row(Target("Plane", "Medium")).status == Status.BAKED
+
+
 def test_a_change_of_other_data_does_not(plane):
     camera = bpy.data.objects.new("Camera", bpy.data.cameras.new("Camera"))
     bpy.context.collection.objects.link(camera)

@@ -6,6 +6,7 @@ Errors of blocks of 12 x 12 texels have noise: that of a texel, some 5 to 50 % a
 
 import numpy as np
 import pytest
+from beamspread import Cancelled
 from beamspread.core.native import native
 
 from shapes import FACES
@@ -198,8 +199,25 @@ def test_noise_that_is_reported_is_that_of_the_image():
     assert 0.6 * reported[0] < noise < 1.1 * reported[0]
 
 
-@pytest.mark.parametrize("width", [0.02, 0.1])
-def test_light_through_gaps_is_the_same_for_any_number_of_threads(width):
-    light, casters, _ = hole(width)
-    one, three = (native.gather_rays(receiver(48), light, casters, **RAYS, threads=threads)[0] for threads in (1, 3))
+@pytest.mark.parametrize("opening", [hole(0.02), hole(0.1), slit()], ids=["keyhole", "hole", "slit"])
+def test_light_through_gaps_is_the_same_for_any_number_of_threads(opening):
+    light, casters, _ = opening
+    one, three = (
+        native.gather_rays(receiver(48), light, casters, **RAYS, seed=3, threads=threads)[0] for threads in (1, 3)
+    )
+    assert (one > 0).mean() > 0.9
     np.testing.assert_array_equal(one, three)
+
+
+def test_a_search_for_light_can_be_cancelled():
+    """Progress stands still while single texels search, and is asked for all the same."""
+    light, casters, _ = slit(0.004)
+    calls = []
+
+    def stop(fraction):
+        calls.append(fraction)
+        return calls.count(fraction) < 3
+
+    with pytest.raises(Cancelled):
+        native.gather_rays(receiver(192), light, casters, **RAYS, seed=1, progress=stop)
+    assert calls[-1] == 0.5  # the first pass is over, and the second not begun

@@ -67,10 +67,10 @@ class LampLight(NamedTuple):
 
     Attributes
     ----------
-    arriving, open : with shadows and without.
-    through_glass : which arrives through glass, where only paths that meet the lamp bring it.
+    arriving, open : light with shadows and without.
+    through_glass : light through glass, which only paths that meet the lamp bring.
     spikes : mean square of the light on such paths.
-    met : part of all paths which they are.
+    met : part of all paths that meet the lamp.
     """
 
     arriving: float
@@ -203,7 +203,7 @@ class Tracer:
         return LampLight(*(factor * total).tolist())
 
     def _hit(self, start: np.ndarray, direction: np.ndarray) -> tuple[tuple[np.ndarray, np.ndarray, Look] | None, bool]:
-        """What a ray meets behind glass: a point slightly above it, its normal towards the start, and its look.
+        """The surface that a ray meets behind glass: a point slightly above it, its normal towards the start, its look.
 
         And whether the ray has crossed glass.
         """
@@ -280,14 +280,16 @@ class Tracer:
         for number in np.unique(np.linspace(0, len(mesh.polygons) - 1, few).astype(int)).tolist():
             face = mesh.polygons[number]
             normal = turn @ np.array(face.normal)
-            normal /= np.linalg.norm(normal) or 1.0
+            if not normal.any():  # the face has no area
+                continue
+            normal /= np.linalg.norm(normal)
             center = np.array(face.center)
             corners = np.array([mesh.vertices[index].co for index in face.vertices])
             count = 1 if len(mesh.polygons) >= few else max(few // len(mesh.polygons), MANY_ON_FACE)
             for point in [center] if count == 1 else _spread_over(corners, center, count):
                 places.append(matrix[:3, :3] @ point + matrix[:3, 3] + lift * normal)
                 normals.append(normal)
-        return np.array(places), np.array(normals)
+        return np.reshape(places, (-1, 3)), np.reshape(normals, (-1, 3))
 
 
 def _without_outlier(values: list[float]) -> list[float]:

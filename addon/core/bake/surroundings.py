@@ -32,7 +32,7 @@ EVEN_NOISE, MOST_NOISE = 0.2, 1.4
 SPREADS = 1.2
 
 # The same of paths by Cycles, which nothing guides: on planes, where a filter helps, and on bent surfaces; the fewest
-# # and the most.
+# and the most.
 CYCLES_PATHS, CYCLES_BENT_PATHS, CYCLES_LIMITS = 50.0, 200.0, (4.0, 128.0)
 # Seconds of one thread for each in the open, and more of them in closed rooms, where paths bounce this often, about.
 CYCLES_PATH, CYCLES_BOUNCES = (3e-6, 7e-6), 4

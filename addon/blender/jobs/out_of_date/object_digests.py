@@ -242,12 +242,17 @@ def _shown_materials(obj) -> list:
     if not any(materials):
         return []
     if materials[-1] is None and obj.type == "MESH":
-        indices = np.zeros(len(obj.data.polygons), np.int32)
-        obj.data.polygons.foreach_get("material_index", indices)
-        last = int(indices.max(initial=0))
+        # An evaluated mesh in Edit Mode has no polygons.
+        last = max(_largest_slot(obj.data), _largest_slot(obj.original.data))
         while materials[-1] is None and last < len(materials) - 1:
             materials.pop()
     return materials
+
+
+def _largest_slot(mesh) -> int:
+    indices = np.zeros(len(mesh.polygons), np.int32)
+    mesh.polygons.foreach_get("material_index", indices)
+    return int(indices.max(initial=0))
 
 
 def _number(*values) -> int:
