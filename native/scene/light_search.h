@@ -51,8 +51,7 @@ public:
     // True if few rays from the tile of a texel get through, so that guided rays have less noise.
     bool is_rare(std::size_t x, std::size_t y) const { return tile_of(x, y).is_rare(); }
 
-    // Where little of a light arrives anywhere: tiles whose guides may miss the light of some texels, and those beside
-    // them, if they have hits around.
+    // Tiles whose guides may miss the light of some texels, and the tiles beside these. None if a light is not rare.
     std::vector<std::size_t> find_hard_tiles() const;
 
     // True if the tile of texel (x, y) or one of its neighbors has a hit.

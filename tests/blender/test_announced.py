@@ -202,7 +202,7 @@ def light_below_a_pane(material):
 
 
 def test_light_of_lamps_through_glass_is_found_by_paths_that_meet_them():
-    """Of a path's directions the sun fills its form factor, the squared sine of half its angle."""
+    """The sun fills a part of a path's directions: its form factor, the squared sine of half its angle."""
     nodes = Nodes(bpy.data.materials.new("Glass"), clear=True)
     around = light_below_a_pane(nodes.finish(nodes.add("BsdfGlass", {})))
     met = 0.05**2

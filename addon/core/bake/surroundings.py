@@ -27,8 +27,8 @@ PATHS, BENT_PATHS, PATH_LIMITS = 100.0, 65.0, (2.0, 128.0)
 # Part of even light's square that counts as noise, beside the squares of the differences between directions; and the
 # largest noise: paths are guided to spots that are brighter.
 EVEN_NOISE, MOST_NOISE = 0.2, 1.4
-# Half the side of a square whose mean has as much noise as light after the medium's spread, in spreads of the channel
-# that spreads least, about.
+# The medium's spread takes noise as the mean over a square does, about: half the side of that square, in spreads of
+# the channel that spreads least.
 SPREADS = 1.2
 
 # The same of paths by Cycles, which nothing guides: on planes, where a filter helps, and on bent surfaces; the fewest
