@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from beamspread import Medium, convolve, library
-from beamspread.core.bake.directions import Splitter
+from beamspread.core.bake.directions import DirectionClasses, Splitter
 from beamspread.core.bake.spreading import FINAL_EFFORT
 from beamspread.core.bake.surface import Surface
 from beamspread.core.bake.textured_bake import arriving_beams, continued
@@ -144,6 +144,20 @@ def test_few_beams_have_all_the_light_of_a_scene():
     # Even light from all around has two thirds of its irradiance's flow.
     flow = sum(light.sum() / 3 * way for light, way in alone[3]) / (sum(light.sum() for light, _ in alone[3]) / 3)
     assert flow == pytest.approx((0, 0, -2 / 3), abs=0.03)
+
+
+def test_weights_of_directions_are_those_of_their_exact_angles():
+    """NumPy's single precision has other last bits where an array follows another in memory: bakes would differ."""
+    random = np.random.default_rng(3)
+    way = random.normal(size=(64, 64, 3))
+    way[..., 2] = -np.abs(way[..., 2])
+    way = (way / np.linalg.norm(way, axis=-1, keepdims=True)).astype(np.float32)
+    exact = np.degrees([math.acos(-z) for z in way[..., 2].ravel().tolist()]).reshape(64, 64)
+    weights = list(DirectionClasses((20.0, 70.0), (0.0,), False).weights(way))
+    steep = np.clip((70 - exact) / 50, 0, 1).astype(np.float32)
+    # A unit in the last place of 1: exact angles, rounded to 1e-7 degrees, may be next to a number halfway.
+    np.testing.assert_allclose(weights[0], steep, rtol=0, atol=6e-8)
+    np.testing.assert_allclose(weights[1], 1 - steep, rtol=0, atol=6e-8)
 
 
 def test_a_splitter_without_light_has_no_beams():

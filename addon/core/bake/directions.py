@@ -188,8 +188,10 @@ class Splitter:
 
 def _angles(way: NDArray) -> tuple[NDArray, NDArray]:
     """Angles from the normal and azimuths, degrees, of directions (..., 3) of travel."""
-    angle = np.degrees(np.arccos(np.clip(-way[..., 2], 0, 1)))
-    return angle, np.degrees(np.arctan2(way[..., 1], way[..., 0]))
+    # Last bits of NumPy's functions depend on where its arrays lie in memory.
+    x, y, z = (np.asarray(way[..., axis], float) for axis in range(3))
+    angle = np.degrees(np.arccos(np.clip(-z, 0, 1)))
+    return angle.round(DIGITS), np.degrees(np.arctan2(y, x)).round(DIGITS)
 
 
 def _nodes(values: NDArray, weights: NDArray, most: int) -> tuple[float, ...]:
