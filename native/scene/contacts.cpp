@@ -3,7 +3,9 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <span>
 
+#include "base/threads.h"
 #include "scene/shadow_ray.h"
 
 namespace beamspread {
@@ -14,10 +16,72 @@ namespace {
 // two matrices in single precision. Larger: decals have to lie higher above their floor to shade it.
 constexpr double height_error = 4.0;
 
+constexpr double half_ulp = 0.5 * static_cast<double>(std::numeric_limits<float>::epsilon());
+
 double height_rounding(const Vec3& corner, const Vec3& origin, const Vec3& normal)
 {
-    const double half_ulp = 0.5 * static_cast<double>(std::numeric_limits<float>::epsilon());
     return height_error * half_ulp * glm::dot(glm::abs(normal), glm::abs(corner - origin));
+}
+
+double height_rounding(const std::array<Vec3, 3>& triangle, const Vec3& origin, const Vec3& normal)
+{
+    return std::max({height_rounding(triangle[0], origin, normal), height_rounding(triangle[1], origin, normal),
+                     height_rounding(triangle[2], origin, normal)});
+}
+
+// True if a triangle with this normal at a height above a surface, which is lower than rays start, blocks light. The error
+// of the height is known.
+bool blocks(const Vec3& triangle, const Vec3& surface, double height, double rounding, const RayStart& start)
+{
+    return glm::dot(triangle, surface) < 0.0 ? height >= -rounding : height > start.clearance + rounding;
+}
+
+// A box along the axes of the world; empty at first.
+struct Box {
+    Vec3 low{std::numeric_limits<double>::infinity()};
+    Vec3 high{-std::numeric_limits<double>::infinity()};
+
+    void include(const Vec3& point)
+    {
+        low = glm::min(low, point);
+        high = glm::max(high, point);
+    }
+
+    bool contains(const Vec3& point) const
+    {
+        return glm::all(glm::greaterThanEqual(point, low)) && glm::all(glm::lessThanEqual(point, high));
+    }
+};
+
+// Where triangles of other objects may be nearer to a mesh than rays start, and the largest error of their heights.
+struct Others {
+    Box box;
+    double rounding = 0.0;
+};
+
+Others others_near(const ReceiverGrid& grid, const Occluders& occluders, const RayStart& start)
+{
+    double away = 0.0;
+    for (const BentTexel& texel : grid.shape->texels)
+        if (texel.is_inside())
+            away = std::max(away, height_of_rays(start, texel));
+    Others near;
+    for (std::size_t i = 0; i < occluders.own_opaque_count(); ++i) {
+        if (occluders.owner(i) == grid.owner)
+            continue;
+        const std::array<Vec3, 3> triangle = occluders.triangle(i);
+        Box of_triangle;
+        for (const Vec3& corner : triangle)
+            of_triangle.include(corner);
+        const Vec3 low = glm::max(of_triangle.low - away, grid.shape->low);
+        const Vec3 high = glm::min(of_triangle.high + away, grid.shape->high);
+        if (glm::any(glm::greaterThan(low, high)))
+            continue;
+        near.box.include(low);
+        near.box.include(high);
+        near.rounding = std::max(near.rounding, height_rounding(triangle, occluders.origin(), Vec3(1.0)));
+    }
+    return near;
 }
 
 }  // namespace
@@ -28,16 +92,55 @@ bool is_contact(const ReceiverGrid& grid, const Occluders& occluders, std::size_
         return false;
     const std::array<Vec3, 3> corners = occluders.triangle(triangle);
     double lowest = std::numeric_limits<double>::infinity();
-    double rounding = 0.0;
     for (const Vec3& corner : corners) {
         const double height = glm::dot(corner - grid.origin, grid.normal);
         if (height > start.height())
             return false;
         lowest = std::min(lowest, height);
-        rounding = std::max(rounding, height_rounding(corner, occluders.origin(), grid.normal));
     }
-    const bool faces_plane = glm::dot(occluders.normal(triangle), grid.normal) < 0.0;
-    return faces_plane ? lowest >= -rounding : lowest > start.clearance + rounding;
+    const double rounding = height_rounding(corners, occluders.origin(), grid.normal);
+    return blocks(occluders.normal(triangle), grid.normal, lowest, rounding, start);
+}
+
+std::vector<std::uint8_t> covered_texels(const ReceiverGrid& grid, const Occluders& occluders, const RayStart& start)
+{
+    const std::span<const BentTexel> texels = grid.shape->texels;
+    const Others near = others_near(grid, occluders, start);
+    std::vector<std::size_t> candidates;
+    for (std::size_t i = 0; i < texels.size(); ++i)
+        if (texels[i].is_inside() && near.box.contains(texels[i].position))
+            candidates.push_back(i);
+    std::vector<std::uint8_t> covered(candidates.empty() ? 0 : texels.size());
+    const std::size_t packets = (candidates.size() + Occluders::packet_size - 1) / Occluders::packet_size;
+    parallel_for(packets, [&](std::size_t packet) {
+        const std::size_t first = packet * Occluders::packet_size;
+        const std::span part =
+            std::span(candidates).subspan(first, std::min(candidates.size() - first, Occluders::packet_size));
+        // From where rays start to the face, and beyond both by errors of heights.
+        std::array<ShadowRay, Occluders::packet_size> rays;
+        for (std::size_t k = 0; k < part.size(); ++k) {
+            const BentTexel& texel = texels[part[k]];
+            const Vec3 face(texel.face);
+            const double height = height_of_rays(start, texel) + near.rounding;
+            rays[k] = {texel.position + face * height, -face, height + near.rounding};
+        }
+        const auto counts = [&](std::size_t k, std::size_t triangle) {
+            if (occluders.owner(triangle) == grid.owner)
+                return false;
+            const BentTexel& texel = texels[part[k]];
+            const Vec3 face(texel.face);
+            const std::array<Vec3, 3> corners = occluders.triangle(triangle);
+            const Vec3 normal = occluders.normal(triangle);
+            // In double precision: the distance along the ray has errors in proportion to the size of the triangle.
+            const double height = glm::dot(corners[0] - texel.position, normal) / glm::dot(face, normal);
+            const double rounding = height_rounding(corners, occluders.origin(), face);
+            return height <= height_of_rays(start, texel) && blocks(normal, face, height, rounding, start);
+        };
+        const std::uint32_t bits = occluders.meet(std::span(rays).first(part.size()), counts);
+        for (std::size_t k = 0; k < part.size(); ++k)
+            covered[part[k]] = bits >> k & 1u;
+    });
+    return covered;
 }
 
 Contacts::Contacts(const ReceiverGrid& grid, const Occluders* occluders, const RayStart& start) : m_grid(grid)

@@ -1,4 +1,4 @@
-// Triangles that lie on a receiver, nearer than shadow rays start.
+// Triangles of other objects that lie on a receiver, nearer than shadow rays start.
 #pragma once
 
 #include <array>
@@ -18,7 +18,11 @@ struct RayStart;
 // the floor below it may share a plane.
 bool is_contact(const ReceiverGrid& grid, const Occluders& occluders, std::size_t triangle, const RayStart& start);
 
-// All such triangles of a grid.
+// For each texel of a mesh that bends 1 if such a triangle lies on its middle, above its face and nearer to it than rays
+// start; empty if none does.
+std::vector<std::uint8_t> covered_texels(const ReceiverGrid& grid, const Occluders& occluders, const RayStart& start);
+
+// All such triangles of a plane.
 class Contacts {
 public:
     // `occluders` may be null.

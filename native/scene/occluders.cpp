@@ -123,6 +123,29 @@ void set_ray(RTCRay16& packet, std::size_t i, const ShadowRay& ray, const Vec3& 
     packet.id[i] = static_cast<unsigned>(i);
 }
 
+// Context that Embree passes to the filter below.
+struct CountContext : RTCIntersectContext {
+    const TriangleSet* set;  // of triangles outside of instances
+    const CountTriangle* counts;
+};
+
+void leave_out_others(const RTCFilterFunctionNArguments* hits)
+{
+    const auto* const context = static_cast<const CountContext*>(hits->context);
+    for (unsigned i = 0; i < hits->N; ++i) {
+        if (hits->valid[i] != -1)
+            continue;
+        bool is_counted = RTCHitN_instID(hits->hit, hits->N, i, 0) == RTC_INVALID_GEOMETRY_ID;
+        if (is_counted) {
+            const std::size_t triangle =
+                context->set->index(RTCHitN_geomID(hits->hit, hits->N, i), RTCHitN_primID(hits->hit, hits->N, i));
+            is_counted = triangle < context->set->opaque_count() &&
+                         (*context->counts)(RTCRayN_id(hits->ray, hits->N, i), triangle);
+        }
+        hits->valid[i] = is_counted ? -1 : 0;
+    }
+}
+
 }  // namespace
 
 struct Occluders::Hierarchy {
@@ -329,6 +352,31 @@ void Occluders::find_surfaces(std::span<const ShadowRay> rays, SurfaceHit* hits,
         if (packet.hit.geomID[i] != RTC_INVALID_GEOMETRY_ID)
             hits[i] = hit_on(packet.hit.instID[0][i], packet.hit.geomID[i], packet.hit.primID[i],
                              {packet.hit.u[i], packet.hit.v[i]}, rays[i].direction);
+}
+
+std::uint32_t Occluders::meet(std::span<const ShadowRay> rays, const CountTriangle& counts) const
+{
+    if (!m_hierarchy || rays.empty())
+        return 0;
+    alignas(64) std::array<int, packet_size> valid{};
+    RTCRayHit16 packet{};
+    for (std::size_t i = 0; i < rays.size(); ++i) {
+        set_ray(packet.ray, i, rays[i], m_origin);
+        packet.hit.geomID[i] = RTC_INVALID_GEOMETRY_ID;
+        packet.hit.instID[0][i] = RTC_INVALID_GEOMETRY_ID;
+        valid[i] = -1;
+    }
+    CountContext context;
+    context.set = m_hierarchy->sets.front().get();
+    context.counts = &counts;
+    rtcInitIntersectContext(&context);
+    context.filter = &leave_out_others;
+    // Not a search for any triangle: filters of see-through ones take part in those.
+    rtcIntersect16(valid.data(), m_hierarchy->top.get(), &context, &packet);
+    std::uint32_t bits = 0;
+    for (std::size_t i = 0; i < rays.size(); ++i)
+        bits |= static_cast<std::uint32_t>(packet.hit.geomID[i] != RTC_INVALID_GEOMETRY_ID) << i;
+    return bits;
 }
 
 std::uint32_t Occluders::trace(std::span<const ShadowRay> rays, Passage* passages, bool is_coherent) const

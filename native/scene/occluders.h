@@ -3,6 +3,7 @@
 
 #include <array>
 #include <cstdint>
+#include <functional>
 #include <limits>
 #include <memory>
 #include <optional>
@@ -60,6 +61,9 @@ struct OccluderSettings {
     std::size_t max_copied = std::size_t{1} << 20;
 };
 
+// True if a triangle that a ray meets counts for it; the triangle is opaque and outside of instances.
+using CountTriangle = std::function<bool(std::size_t ray, std::size_t triangle)>;
+
 // An immutable set of triangles with a bounding volume hierarchy; both sides of a triangle block. Its queries may run
 // on any number of threads at once. Embree works in single precision, here relative to an origin near the receivers, so
 // that shadows do not drift where the scene is far from the world's origin. Instances keep the triangles of their mesh
@@ -81,6 +85,10 @@ public:
 
     // Finds the nearest surface along at most `packet_size` rays.
     void find_surfaces(std::span<const ShadowRay> rays, SurfaceHit* hits, bool is_coherent) const;
+
+    // Returns bits: bit i is set if the i-th of at most `packet_size` rays meets a triangle that counts, which must not
+    // throw.
+    std::uint32_t meet(std::span<const ShadowRay> rays, const CountTriangle& counts) const;
 
     // Number of see-through triangles that a ray crosses; it ends at the next.
     int max_crossings() const { return m_max_crossings; }

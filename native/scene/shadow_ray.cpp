@@ -18,7 +18,7 @@ constexpr double offset_ulps = 16.0;
 
 // Height of the starts of rays above a face of a mesh that bends, as a fraction of the texel's longer side, besides
 // rounding: within a texel the mesh departs from the face. Larger: texels of fine hollows see the light of more of their
-// area, and light leaks over rims and under things that touch the mesh.
+// area, and light leaks over rims.
 constexpr double bent_clearance = 1e-3;
 
 // Texels whose creases are searched together.
@@ -91,6 +91,11 @@ RayStart ray_start(const ReceiverGrid& grid, const Occluders* occluders, double 
 
 }  // namespace
 
+double height_of_rays(const RayStart& start, const BentTexel& texel)
+{
+    return start.height() + bent_clearance * texel.pitch();
+}
+
 double rounding_of(const std::array<Vec3, 3>& triangle, const Vec3& origin)
 {
     return rounding_at(
@@ -108,13 +113,10 @@ ReceiverRays::ReceiverRays(const ReceiverGrid& grid, const Occluders* occluders,
       m_contacts(grid, grid.is_bent() ? nullptr : occluders, m_start),
       m_position_rounding(std::numeric_limits<double>::epsilon() * grid.reach(Vec3(0.0)))
 {
-    if (grid.is_bent() && occluders)
-        find_open_parts(*occluders);
-}
-
-double ReceiverRays::bent_height(const BentTexel& texel) const
-{
-    return m_start.height() + bent_clearance * texel.pitch();
+    if (!grid.is_bent() || !occluders)
+        return;
+    m_covered = covered_texels(grid, *occluders, m_start);
+    find_open_parts(*occluders);
 }
 
 // Traces short rays from the middle of each texel to its corners and sides.
@@ -130,7 +132,7 @@ void ReceiverRays::find_open_parts(const Occluders& occluders)
         const BentTexel& texel = m_grid.bent_texel(i);
         if (!texel.is_inside())
             return;
-        const Vec3 middle = texel.position + Vec3(texel.face) * bent_height(texel);
+        const Vec3 middle = texel.position + Vec3(texel.face) * height_of_rays(m_start, texel);
         std::array<ShadowRay, border.size()> rays;
         std::array<SurfaceHit, border.size()> hits;
         for (std::size_t k = 0; k < border.size(); ++k) {
@@ -168,16 +170,20 @@ Vec3 ReceiverRays::start_at(std::size_t texel, const Vec3& point) const
 ShadowRay ReceiverRays::shadow_ray(std::size_t texel, const Vec3& at, const LightRay& ray) const
 {
     Vec3 point = at;
-    Vec3 lift;
+    Vec3 normal = m_grid.normal;
     double height = m_start.height();
+    bool is_covered = false;
     if (m_grid.is_bent()) {
-        height = bent_height(m_grid.bent_texel(texel));
-        lift = Vec3(m_grid.bent_texel(texel).face) * height;
+        const BentTexel& of_mesh = m_grid.bent_texel(texel);
+        normal = Vec3(of_mesh.face);
+        height = height_of_rays(m_start, of_mesh);
+        is_covered = !m_covered.empty() && m_covered[texel];
         point = start_at(texel, at);
     } else {
-        // Below a triangle that lies on the plane, the ray starts behind both, and meets it.
-        lift = m_grid.normal * (m_contacts.cover(point) ? -height : height);
+        is_covered = m_contacts.cover(point);
     }
+    // Below a triangle that lies on the surface, the ray starts behind both, and meets it.
+    const Vec3 lift = normal * (is_covered ? -height : height);
     if (std::isinf(ray.distance))
         return {.origin = point + lift, .direction = -ray.travel, .distance = ray.distance};
     Vec3 way = -ray.travel * ray.distance - lift;

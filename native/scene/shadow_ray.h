@@ -6,6 +6,7 @@
 #pragma once
 
 #include <array>
+#include <cstdint>
 #include <limits>
 #include <vector>
 
@@ -27,6 +28,9 @@ struct RayStart {
 
     double height() const { return rounding + clearance; }
 };
+
+// Height above the face of a texel of a mesh that bends where its rays start, metres.
+double height_of_rays(const RayStart& start, const BentTexel& texel);
 
 // Bound of the rounding, metres, of a triangle as rays meet it, or of the instance in a hull.
 double rounding_of(const std::array<Vec3, 3>& triangle, const Vec3& origin);
@@ -58,13 +62,13 @@ public:
     ShadowRay shadow_ray(std::size_t texel, const Vec3& point, const LightRay& ray) const;
 
 private:
-    double bent_height(const BentTexel& texel) const;
     Vec3 start_at(std::size_t texel, const Vec3& point) const;
     void find_open_parts(const Occluders& occluders);
 
     const ReceiverGrid& m_grid;
     RayStart m_start;
-    Contacts m_contacts;
+    Contacts m_contacts;  // of a plane
+    std::vector<std::uint8_t> m_covered;  // [texel] of a mesh that bends; empty: 0
     double m_position_rounding;  // metres
     // [texel] part of the way from the middle of a texel to its border that no face of the mesh blocks; empty: 1.
     std::vector<float> m_open_parts;
