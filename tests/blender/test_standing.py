@@ -227,6 +227,39 @@ def test_a_change_of_other_data_does_not(plane):
     assert not row().is_stale
 
 
+@pytest.mark.parametrize("indirect", [False, True])
+def test_an_object_without_faces_does_not_but_its_first_face_does(indirect):
+    bpy.context.scene.beamspread.resolution, bpy.context.scene.beamspread.use_indirect = 32, indirect
+    plane = add_plane(material=add_material())
+    add_sun(20)
+    bake(plane)
+    path = bpy.data.curves.new("Rail", "CURVE")
+    path.dimensions = "3D"
+    path.splines.new("POLY").points.add(3)
+    for number, point in enumerate(path.splines[0].points):
+        point.co = number / 4, 0, 0.1, 1
+    mesh = bpy.data.meshes.new("Points")
+    mesh.from_pydata([(0, 0, 1), (1, 0, 1), (0, 1, 1)], [(0, 1)], [])
+    for data in (path, mesh):
+        bpy.context.collection.objects.link(bpy.data.objects.new(data.name, data))
+    update()
+    assert not row().is_stale
+    path.bevel_depth = 0.01
+    update()
+    assert row().is_stale
+    path.bevel_depth = 0
+    update()
+    assert not row().is_stale
+    solid = bpy.data.objects["Points"].modifiers.new("Skin", "SOLIDIFY")
+    update()
+    assert row().is_stale
+    bpy.data.objects["Points"].modifiers.remove(solid)
+    mesh.clear_geometry()
+    mesh.from_pydata([(0, 0, 1), (1, 0, 1), (0, 1, 1)], [], [(0, 1, 2)])
+    update()
+    assert row().is_stale
+
+
 def test_bakes_of_other_objects_do_not(plane):
     """Each other's images and links don't count, nor does a bake of one undo the other's."""
     other = add_plane("Other", matrix=Matrix.Translation((5, 0, 0)), material=add_material("Second"))

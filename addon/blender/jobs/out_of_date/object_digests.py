@@ -108,7 +108,7 @@ class ObjectDigests:
         is_lit = lights_surfaces(obj, instancer)
         if obj.type == "LIGHT" and is_lit and not is_portal(obj.data):
             self.lamps += self._lamp(obj, matrix)
-        elif obj.type in (SOLID_TYPES if self._bounces else SURFACE_TYPES):
+        elif obj.type in (SOLID_TYPES if self._bounces else SURFACE_TYPES) and not _is_faceless(obj.original):
             casts = all(owner.visible_shadow for owner in (obj, instancer) if owner is not None)
             looks = self._looks(_shown_materials(obj))
             links = self._links(obj) if is_lit and any(text for _, text in looks) else []
@@ -200,6 +200,16 @@ def surface_values(node, _groups: tuple = (), side: str = "") -> list:
     edges, use = [] if surface.edges == OPEN else [surface.edges], node.texture_use()
     texture = node.has_texture() and (use.method if use.is_scattered else use.blur)
     return [repr(surface), side if surface.thickness > 0 else "", texture, *edges]
+
+
+def _is_faceless(obj) -> bool:
+    """True for paths and for meshes without faces, if nothing gives them any: no light meets them."""
+    if obj.modifiers or obj.particle_systems:
+        return False
+    data = obj.data
+    if obj.type == "CURVE":
+        return data.dimensions == "3D" and data.bevel_object is None and data.extrude == data.bevel_depth == 0
+    return obj.type == "MESH" and not data.polygons
 
 
 def _scatters(obj) -> bool:
