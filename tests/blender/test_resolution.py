@@ -87,9 +87,19 @@ def test_the_panel_tells_the_spread():
     marble_plane(1.0, "Small")
     scenes.select(*bpy.context.scene.objects[-2:])
     assert "The light spreads over 4.4 texels" in panel()
-    image = bpy.data.images.new("Fine", 1024, 1024, float_buffer=True)
-    scenes.select(marble_plane(2e-3, "Tiny", image=image))
-    assert "The light spreads over 4,400 texels" in panel()
+    image = bpy.data.images.new("Fine", 1280, 1280, float_buffer=True)
+    fine = marble_plane(1e-2, "Fine", image=image)
+    scenes.select(fine)
+    assert "The light spreads over 1,100 texels" in panel()
+
+
+def test_the_panel_tells_no_spread_beyond_an_image():
+    """8.51 mm are 4.26 times the side of a plane of 2 mm."""
+    tiny = marble_plane(2e-3, "Tiny", image=bpy.data.images.new("Tiny", 64, 64, float_buffer=True))
+    scenes.select(tiny)
+    assert "The light spreads over the whole surface" in panel()
+    scenes.select(tiny, marble_plane(2.0, "Large"))
+    assert "The light spreads over 4.4 texels and more" in panel()
 
 
 def test_a_diffuse_bake_is_named_in_panel_report_and_log(tmp_path):

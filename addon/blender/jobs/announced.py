@@ -295,13 +295,23 @@ def spread_lines(announced: dict[Target, Announced], targets: Iterable[Target]) 
     Both sides of a sheet have one line.
     """
     spreads = {target: announced[target].spread for target in targets if target in announced}
-    shown = [spread.texels for spread in spreads.values() if spread is not None and not spread.is_diffuse]
-    # Two digits, without exponent.
-    least, most = (f"{float(f'{texels:.2g}'):,.10g}" for texels in (min(shown, default=0.0), max(shown, default=0.0)))
-    lines = [f"The light spreads over {least if least == most else f'{least} to {most}'} texels"] if shown else []
+    shown = [spread for spread in spreads.values() if spread is not None and not spread.is_diffuse]
+    lines = [f"The light spreads over {_extent(shown)}"] if shown else []
     diffuse = {target: spread for target, spread in spreads.items() if spread is not None and spread.is_diffuse}
     lines += [str(message) for target, spread in diffuse.items() for message in spread.messages(target.object_name)]
     return list(dict.fromkeys(lines))[:MAX_LINES]
+
+
+def _extent(spreads: list[Spread]) -> str:
+    """Least to most texels over which light spreads. Numbers beyond the size of an image would tell nothing."""
+    # Two digits, without exponent.
+    texels = [f"{float(f'{spread.texels:.2g}'):,.10g}" for spread in sorted(spreads, key=lambda spread: spread.texels)
+              if not spread.is_wide]
+    if not texels:
+        return "the whole surface"
+    if len(texels) < len(spreads):
+        return f"{texels[0]} texels and more"
+    return f"{texels[0] if texels[0] == texels[-1] else f'{texels[0]} to {texels[-1]}'} texels"
 
 
 def _total(chosen: list[Announced]) -> float:

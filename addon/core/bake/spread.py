@@ -163,6 +163,11 @@ class Spread:
         return self.texels < 1
 
     @property
+    def is_wide(self) -> bool:
+        """True if light spreads as far as the image is long."""
+        return self.texels >= self.side
+
+    @property
     def better_side(self) -> int | None:
         """Texels along the longer side of an image that shows the spread, if there can be one."""
         wanted = self.side * TEXELS_PER_PATH / self.texels
