@@ -11,7 +11,7 @@ from beamspread.blender.read.image_nodes import from_srgb
 from beamspread.core.batch.batch_options import FORMATS
 from beamspread.core.display import EXPOSURE, png_exposure
 from beamspread.core.native import native
-from scenes import add_material, add_plane, add_sun, bake, node_of, pixels, run_batch
+from scenes import add_material, add_plane, add_sun, bake, messages_of, node_of, pixels, run_batch, select
 
 from plain_hdr import decoded_hdr
 
@@ -67,7 +67,7 @@ def test_a_file_divided_by_its_exposure_is_the_bake(tmp_path, file_format, expos
     else:
         assert stored == float(exposure or 1)
     clips = is_png and exposure is None
-    assert ("clips values above 1" in record.message) == clips
+    assert ("clips values above 1. EXR keeps them, and --exposure auto scales them." in record.message) == clips
     if not clips:
         assert values.mean(axis=(0, 1)) / stored == pytest.approx(mean, rel=BOUNDS[file_format])
 
@@ -79,6 +79,35 @@ def test_the_scene_asks_for_it_as_well(tmp_path):
     (record,) = run_batch("--output", tmp_path).bakes
     assert record.exposure < 1
     assert "clips" not in record.message
+
+
+def test_messages_of_the_window_name_its_own_settings(tmp_path, capfd):
+    scene(strength=40.0)
+    settings = bpy.context.scene.beamspread
+    assert settings.output_dir.startswith("//")
+    select(bpy.data.objects["Plane"])
+    text = messages_of(bpy.ops.beamspread.bake_animation)
+    assert "The scene was never saved, so there is no folder to write to. Save it, or choose another folder." in text
+    settings.format, settings.output_dir = "PNG", str(tmp_path)
+    bpy.ops.beamspread.bake_files()
+    assert "clips values above 1. EXR keeps them, and Fit Exposure scales them." in capfd.readouterr().out
+    settings.use_exposure = True
+    sun = bpy.data.objects["Sun"].data
+    for frame, energy in ((1, 10), (2, 160)):
+        sun.energy = energy
+        sun.keyframe_insert("energy", frame=frame)
+    bpy.context.scene.frame_start, bpy.context.scene.frame_end = 1, 2
+    bpy.ops.beamspread.bake_animation()
+    out = capfd.readouterr().out
+    assert "instead of" in out
+    assert "EXR files need none." in out
+    assert "--" not in out
+
+
+def test_a_batch_of_a_file_that_was_never_saved_names_its_option():
+    scene(strength=40.0)
+    (record,) = run_batch().bakes
+    assert "Save it, or give another folder by --output." in record.message
 
 
 def test_frames_have_one_exposure_while_it_fits(tmp_path):

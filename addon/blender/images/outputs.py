@@ -27,8 +27,10 @@ from .udim import is_tiled, tile_sizes, tiles_path
 class Outputs:
     """The files of a run. Their names depend on the scene, not on the objects that are baked."""
 
-    def __init__(self, scene, options: BatchOptions) -> None:
+    def __init__(self, scene, options: BatchOptions, is_command: bool = False) -> None:
+        """`is_command`: the options come from a command line, and messages name those that help."""
         self._options, self._settings, self._results = options, scene.beamspread, Results()
+        self._is_command = is_command
         self._view_of = scene if scene.beamspread.use_view_transform else None
         targets = find_targets(with_instanced(scene.objects))
         self._exposures: dict[tuple[Target, str], float] = {}
@@ -76,15 +78,16 @@ class Outputs:
         self._exposures[key] = min(fits, former)
         if fits < former:
             text = f"From frame {frame} on, files of '{bake.target}' have the exposure {fits:g} instead of {former:g}."
-            bake.warn(str(bake.target), text, f"In batches, --exposure {fits:g} gives one to all frames.")
+            remedy = f"--exposure {fits:g} gives one to all frames." if self._is_command else "EXR files need none."
+            bake.warn(str(bake.target), text, remedy)
         return self._exposures[key]
 
     def _warn_of_range(self, bake: Bake, name: str, largest: float) -> None:
         """Warn if the format does not hold the largest value of a file."""
         file_format = self._format()
         if _is_limited(file_format) and largest > 1 and self._view_of is None:
-            remedy = "EXR keeps them, and Fit Exposure scales them (in batches --exposure auto)."
-            bake.warn(name, f"'{name}' clips values above 1.", remedy)
+            scaler = "--exposure auto" if self._is_command else "Fit Exposure"
+            bake.warn(name, f"'{name}' clips values above 1.", f"EXR keeps them, and {scaler} scales them.")
         if file_format == "EXR_HALF" and largest > float(np.finfo(np.float16).max):
             bake.warn(name, f"'{name}' has 32 bits, because 16 bits hold no values above 65504.")
 
@@ -95,7 +98,7 @@ class Outputs:
         if folder.startswith("//") and not bpy.data.filepath:
             raise ImageError(
                 "The scene was never saved, so there is no folder to write to.",
-                "Save it, or choose another folder (in batches --output).",
+                f"Save it, or {'give another folder by --output' if self._is_command else 'choose another folder'}.",
             )
         if layer == DIRECTION and not file_format.startswith("EXR"):
             name = "An HDR file" if file_format == "HDR" else "A PNG"

@@ -72,7 +72,7 @@ class _Batch(Sink):
         self._frame = self._scene.frame_current
         self._parts: dict[Target, Parts] = {}
         self._settings = self._scene.beamspread.for_bake(options.solver, options.pass_name, options.indirect)
-        self._outputs = Outputs(self._scene, options)
+        self._outputs = Outputs(self._scene, options, is_command=True)
         self._with_maps = objects_with_maps()
         self._earlier = PreviousReport(options.report, _saved()) if options.resume else None
 
