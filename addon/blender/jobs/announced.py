@@ -305,8 +305,11 @@ def spread_lines(announced: dict[Target, Announced], targets: Iterable[Target]) 
 def _extent(spreads: list[Spread]) -> str:
     """Least to most texels over which light spreads. Numbers beyond the size of an image would tell nothing."""
     # Two digits, without exponent.
-    texels = [f"{float(f'{spread.texels:.2g}'):,.10g}" for spread in sorted(spreads, key=lambda spread: spread.texels)
-              if not spread.is_wide]
+    texels = [
+        f"{float(f'{spread.texels:.2g}'):,.10g}"
+        for spread in sorted(spreads, key=lambda spread: spread.texels)
+        if not spread.is_wide
+    ]
     if not texels:
         return "the whole surface"
     if len(texels) < len(spreads):
