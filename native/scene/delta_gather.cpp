@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "base/threads.h"
+#include "scene/even_tiles.h"
 #include "scene/ray_gather.h"
 #include "scene/shadow_ray.h"
 #include "scene/shadows.h"
@@ -18,6 +19,10 @@ namespace {
 // Distance to a point lamp, in texels, above which two Gauss points along each axis give the mean of a texel, to 2e-6.
 // Higher values are slower and more exact.
 constexpr double texels_to_smooth_lamp = 16.0;
+
+// Points of a texel on a mesh that bends from which on the first rays of tiles tell how the others go. Fewer are traced as
+// fast without.
+constexpr std::size_t least_even_points = 8;
 
 // A point of a texel: its place in the unit square, and on a plane the step from the texel's corner in the world.
 struct SubTexel {
@@ -53,7 +58,15 @@ std::vector<SubTexel> gauss_points(const ReceiverGrid& grid)
     return points;
 }
 
-// Casts rays only from texels that `Shadows` can't decide.
+std::vector<Vec2> places(std::span<const SubTexel> points)
+{
+    std::vector<Vec2> all;
+    for (const SubTexel& point : points)
+        all.push_back(point.place);
+    return all;
+}
+
+// Casts rays only from texels that neither `Shadows` nor `EvenTiles` decide.
 class DeltaGatherer {
 public:
     DeltaGatherer(const ReceiverGrid& grid, const Light& light, const Occluders* occluders, const RaySettings& settings)
@@ -68,8 +81,11 @@ public:
           m_shadows(grid, m_source, occluders, m_rays.start(), settings.find_shadows),
           m_sums(settings.noise ? grid.height : 0)
     {
-        if (grid.is_bent())
+        if (grid.is_bent()) {
+            if (occluders && settings.find_shadows && m_points.size() >= least_even_points)
+                m_even_tiles = EvenTiles(grid, light, *occluders, m_rays, places(m_points));
             return;
+        }
         const Texel open = gather_texel(0, 0, m_points, nullptr);
         m_open_irradiance = Vec3f(open.irradiance);
         m_far_travel = mean_direction(0, open.flow);
@@ -89,6 +105,11 @@ public:
     {
         Work& work = m_work.local();
         m_shadows.shade_band(band, work.shades);
+        if (m_grid.is_bent())
+            for (std::size_t i = 0; i < work.shades.size(); ++i)
+                if (work.shades[i] == Shade::unknown)
+                    work.shades[i] =
+                        m_even_tiles.shade(i % m_grid.width, band * Shadows::rows_per_band + i / m_grid.width);
         work.irradiance.resize(m_grid.width);
         work.travel.assign(m_grid.width, m_far_travel);
         const std::size_t rows = work.shades.size() / m_grid.width;
@@ -262,6 +283,7 @@ private:
     std::vector<SubTexel> m_smooth_points;
     ReceiverRays m_rays;
     Shadows m_shadows;
+    EvenTiles m_even_tiles;  // where the grid bends
     // Irradiance and travel at texel (0, 0) where nothing blocks the light: those of all texels of a plane, if it is
     // infinitely far.
     Vec3f m_open_irradiance{0.0f}, m_far_travel{0.0f, 0.0f, -1.0f};

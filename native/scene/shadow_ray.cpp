@@ -5,8 +5,6 @@
 #include <limits>
 #include <span>
 
-#include "base/threads.h"
-
 namespace beamspread {
 
 namespace {
@@ -20,9 +18,6 @@ constexpr double offset_ulps = 16.0;
 // rounding: within a texel the mesh departs from the face. Larger: texels of fine hollows see the light of more of their
 // area, and light leaks over rims.
 constexpr double bent_clearance = 1e-3;
-
-// Texels whose creases are searched together.
-constexpr std::size_t texels_at_once = 1024;
 
 double rounding_at(double reach)
 {
@@ -109,6 +104,7 @@ double rounding_of(const Hull& hull)
 
 ReceiverRays::ReceiverRays(const ReceiverGrid& grid, const Occluders* occluders, double clearance)
     : m_grid(grid),
+      m_occluders(occluders),
       m_start(ray_start(grid, occluders, clearance)),
       m_contacts(grid, grid.is_bent() ? nullptr : occluders, m_start),
       m_position_rounding(std::numeric_limits<double>::epsilon() * grid.reach(Vec3(0.0)))
@@ -116,82 +112,91 @@ ReceiverRays::ReceiverRays(const ReceiverGrid& grid, const Occluders* occluders,
     if (!grid.is_bent() || !occluders)
         return;
     m_covered = covered_texels(grid, *occluders, m_start);
-    find_open_parts(*occluders);
+    m_open_parts = std::vector<std::atomic<float>>(grid.texels());
+    for (std::atomic<float>& part : m_open_parts)
+        part.store(-1.0f, std::memory_order_relaxed);
 }
 
-// Traces short rays from the middle of each texel to its corners and sides.
-void ReceiverRays::find_open_parts(const Occluders& occluders)
+// Traces short rays from the middle of a texel to its corners and sides.
+double ReceiverRays::find_open_part(const BentTexel& texel) const
 {
     constexpr std::array<Vec2, 8> border = {Vec2(0.0, 0.0), Vec2(0.5, 0.0), Vec2(1.0, 0.0), Vec2(1.0, 0.5),
                                             Vec2(1.0, 1.0), Vec2(0.5, 1.0), Vec2(0.0, 1.0), Vec2(0.0, 0.5)};
-    m_open_parts.assign(m_grid.texels(), 1.0f);
-    const auto is_own = [&](const SurfaceHit& hit) {
-        return hit.is_hit && (!hit.own_opaque || occluders.owner(*hit.own_opaque) == m_grid.owner);
-    };
-    const auto find = [&](std::size_t i) {
-        const BentTexel& texel = m_grid.bent_texel(i);
-        if (!texel.is_inside())
-            return;
-        const Vec3 middle = texel.position + Vec3(texel.face) * height_of_rays(m_start, texel);
-        std::array<ShadowRay, border.size()> rays;
-        std::array<SurfaceHit, border.size()> hits;
-        for (std::size_t k = 0; k < border.size(); ++k) {
-            const Vec3 way = texel.point(border[k].x, border[k].y) - texel.position;
-            const double length = glm::length(way);
-            rays[k] = {.origin = middle, .direction = way / length, .distance = length};
-        }
-        // Most texels have no crease, which takes less time to see.
-        std::array<Vec3f, border.size()> transmittance;
-        occluders.transmit(rays, transmittance.data(), false);
-        if (std::ranges::all_of(transmittance, [](const Vec3f& part) { return part == Vec3f(1.0f); }))
-            return;
-        occluders.find_surfaces(rays, hits.data(), true);
-        for (std::size_t k = 0; k < border.size(); ++k)
-            if (is_own(hits[k])) {
-                const double open = glm::distance(hits[k].position, middle) / rays[k].distance;
-                m_open_parts[i] = std::min(m_open_parts[i], static_cast<float>(open));
-            }
-    };
-    const std::size_t runs = (m_grid.texels() + texels_at_once - 1) / texels_at_once;
-    parallel_for(runs, [&](std::size_t run) {
-        const std::size_t end = std::min((run + 1) * texels_at_once, m_grid.texels());
-        for (std::size_t i = run * texels_at_once; i < end; ++i)
-            find(i);
-    });
+    if (!texel.is_inside())
+        return 1.0;
+    const Vec3 middle = texel.position + Vec3(texel.face) * height_of_rays(m_start, texel);
+    std::array<ShadowRay, border.size()> rays;
+    std::array<SurfaceHit, border.size()> hits;
+    for (std::size_t k = 0; k < border.size(); ++k) {
+        const Vec3 way = texel.point(border[k].x, border[k].y) - texel.position;
+        const double length = glm::length(way);
+        rays[k] = {.origin = middle, .direction = way / length, .distance = length};
+    }
+    // Most texels have no crease, which takes less time to see.
+    std::array<Vec3f, border.size()> transmittance;
+    m_occluders->transmit(rays, transmittance.data(), false);
+    if (std::ranges::all_of(transmittance, [](const Vec3f& part) { return part == Vec3f(1.0f); }))
+        return 1.0;
+    m_occluders->find_surfaces(rays, hits.data(), true);
+    float open = 1.0f;
+    for (std::size_t k = 0; k < border.size(); ++k)
+        if (hits[k].is_hit && (!hits[k].own_opaque || m_occluders->owner(*hits[k].own_opaque) == m_grid.owner))
+            open = std::min(open, static_cast<float>(glm::distance(hits[k].position, middle) / rays[k].distance));
+    return static_cast<double>(open);
 }
 
-Vec3 ReceiverRays::start_at(std::size_t texel, const Vec3& point) const
+double ReceiverRays::open_part(std::size_t texel) const
+{
+    if (m_open_parts.empty())
+        return 1.0;
+    std::atomic<float>& known = m_open_parts[texel];
+    float part = known.load(std::memory_order_relaxed);
+    if (part < 0.0f) {
+        part = static_cast<float>(find_open_part(m_grid.bent_texel(texel)));
+        known.store(part, std::memory_order_relaxed);
+    }
+    return static_cast<double>(part);
+}
+
+// `way`: from the start, before it is lifted, to the light, where that has a place.
+ShadowRay ReceiverRays::ray_from(const Vec3& start, const Vec3& way, const Vec3& lift, double height,
+                                 const LightRay& ray) const
+{
+    if (std::isinf(ray.distance))
+        return {.origin = start + lift, .direction = -ray.travel, .distance = ray.distance};
+    const Vec3 lifted = way - lift;
+    const double length = glm::length(lifted);
+    // The ray ends short of the lamp by the same margin, so that a lamp that touches a surface is not shadowed by it.
+    return {.origin = start + lift, .direction = lifted / length, .distance = length - height};
+}
+
+// The step to the start of a ray of a mesh that bends, and its length. Below a triangle that lies on the surface, the ray
+// starts behind both, and meets it.
+std::pair<Vec3, double> ReceiverRays::bent_lift(std::size_t texel) const
 {
     const BentTexel& of_mesh = m_grid.bent_texel(texel);
-    const double part = m_open_parts.empty() ? 1.0 : static_cast<double>(m_open_parts[texel]);
-    return glm::mix(of_mesh.position, point, part);
+    const double height = height_of_rays(m_start, of_mesh);
+    const bool is_covered = !m_covered.empty() && m_covered[texel];
+    return {Vec3(of_mesh.face) * (is_covered ? -height : height), height};
+}
+
+ShadowRay ReceiverRays::first_ray(std::size_t texel, const Vec3& at, const LightRay& ray) const
+{
+    const auto [lift, height] = bent_lift(texel);
+    return ray_from(at, -ray.travel * ray.distance, lift, height, ray);
 }
 
 ShadowRay ReceiverRays::shadow_ray(std::size_t texel, const Vec3& at, const LightRay& ray) const
 {
-    Vec3 point = at;
-    Vec3 normal = m_grid.normal;
-    double height = m_start.height();
-    bool is_covered = false;
+    const Vec3 way = -ray.travel * ray.distance;
     if (m_grid.is_bent()) {
-        const BentTexel& of_mesh = m_grid.bent_texel(texel);
-        normal = Vec3(of_mesh.face);
-        height = height_of_rays(m_start, of_mesh);
-        is_covered = !m_covered.empty() && m_covered[texel];
-        point = start_at(texel, at);
-    } else {
-        is_covered = m_contacts.cover(point);
+        const auto [lift, height] = bent_lift(texel);
+        const Vec3 start = glm::mix(m_grid.bent_texel(texel).position, at, open_part(texel));
+        return ray_from(start, way + (at - start), lift, height, ray);
     }
-    // Below a triangle that lies on the surface, the ray starts behind both, and meets it.
-    const Vec3 lift = normal * (is_covered ? -height : height);
-    if (std::isinf(ray.distance))
-        return {.origin = point + lift, .direction = -ray.travel, .distance = ray.distance};
-    Vec3 way = -ray.travel * ray.distance - lift;
-    if (m_grid.is_bent())
-        way += at - point;
-    const double length = glm::length(way);
-    // The ray ends short of the lamp by the same margin, so that a lamp that touches a surface is not shadowed by it.
-    return {.origin = point + lift, .direction = way / length, .distance = length - height};
+    // As there.
+    const double height = m_start.height();
+    return ray_from(at, way, m_grid.normal * (m_contacts.cover(at) ? -height : height), height, ray);
 }
 
 }  // namespace beamspread

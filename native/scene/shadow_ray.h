@@ -6,8 +6,11 @@
 #pragma once
 
 #include <array>
+#include <atomic>
+#include <cstddef>
 #include <cstdint>
 #include <limits>
+#include <utility>
 #include <vector>
 
 #include "scene/contacts.h"
@@ -61,17 +64,24 @@ public:
     // The shadow ray from a point of a texel toward the light.
     ShadowRay shadow_ray(std::size_t texel, const Vec3& point, const LightRay& ray) const;
 
+    // The same on a mesh that bends, without a look at creases: it may start behind a face that cuts the texel.
+    ShadowRay first_ray(std::size_t texel, const Vec3& point, const LightRay& ray) const;
+
 private:
-    Vec3 start_at(std::size_t texel, const Vec3& point) const;
-    void find_open_parts(const Occluders& occluders);
+    double open_part(std::size_t texel) const;
+    double find_open_part(const BentTexel& texel) const;
+    ShadowRay ray_from(const Vec3& start, const Vec3& way, const Vec3& lift, double height, const LightRay& ray) const;
+    std::pair<Vec3, double> bent_lift(std::size_t texel) const;
 
     const ReceiverGrid& m_grid;
+    const Occluders* m_occluders;
     RayStart m_start;
     Contacts m_contacts;  // of a plane
     std::vector<std::uint8_t> m_covered;  // [texel] of a mesh that bends; empty: 0
     double m_position_rounding;  // metres
-    // [texel] part of the way from the middle of a texel to its border that no face of the mesh blocks; empty: 1.
-    std::vector<float> m_open_parts;
+    // [texel] part of the way from the middle of a texel to its border that no face of the mesh blocks; below 0 until a ray
+    // starts there; empty: 1. Threads that find the same one find the same value.
+    mutable std::vector<std::atomic<float>> m_open_parts;
 };
 
 }  // namespace beamspread
