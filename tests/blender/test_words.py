@@ -151,6 +151,11 @@ def test_tooltips_of_operators():
     assert not faults
 
 
+def test_tooltip_of_the_node():
+    """Menus of nodes show it and end it with a period."""
+    assert not faults_of(BeamspreadNode.bl_rna.description, PROPERTY_VERBS)
+
+
 def test_labels_of_panels():
     panels = of_add_on(bpy.types.Panel)
     assert len(panels) > 5

@@ -164,6 +164,7 @@ class BeamspreadNode(ColorProperties, PathProperties, bpy.types.ShaderNodeCustom
 
     bl_idname = "BeamspreadNode"
     bl_label = "Beamspread"
+    bl_description = "Bake the light inside a translucent surface into an image, and show it"
     bl_icon = "LIGHT_SUN"
     bl_width_default = 240
 
