@@ -44,6 +44,8 @@ OPEN_RAY, BROAD_RAY, NARROW_RAY = 0.15e-6, 0.17e-6, 0.12e-6
 # Seconds per texel and lamp of the rays to a lamp without a size, and for each doubling of `MANY_TRIANGLES`: their
 # shadows have more borders.
 LAMP_RAYS, LAMP_TRIANGLES = 0.3e-6, 1.0e-6
+# Part of the latter on surfaces that bend: where tiles of texels are lit or shaded alike, few rays are traced.
+BENT_TRIANGLES = 0.3
 # Triangles of an average scene, whose shadow rays take these times. Fewer cast fewer shadows; more are traced longer.
 MANY_TRIANGLES = 1000
 
@@ -205,7 +207,8 @@ class Workload:
 
     def _rays_of_lamps(self, settings: BakeSettings) -> float:
         doublings = max(math.log2(max(self.triangles, 1) / MANY_TRIANGLES), 0.0)
-        return (self.suns + self.lamps) * (LAMP_RAYS + LAMP_TRIANGLES * doublings * settings.samples**2 / 16)
+        traced = LAMP_TRIANGLES * (BENT_TRIANGLES if self.is_bent else 1.0) * settings.samples**2 / 16
+        return (self.suns + self.lamps) * (LAMP_RAYS + traced * doublings)
 
     def _rays_of_sizes(self) -> float:
         broad, narrow = self.broad_traced, self.narrow_traced
