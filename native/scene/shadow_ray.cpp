@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <optional>
 #include <span>
 
 namespace beamspread {
@@ -139,9 +140,11 @@ double ReceiverRays::find_open_part(const BentTexel& texel) const
         return 1.0;
     m_occluders->find_surfaces(rays, hits.data(), true);
     float open = 1.0f;
-    for (std::size_t k = 0; k < border.size(); ++k)
-        if (hits[k].is_hit && (!hits[k].own_opaque || m_occluders->owner(*hits[k].own_opaque) == m_grid.owner))
+    for (std::size_t k = 0; k < border.size(); ++k) {
+        const std::optional<std::size_t> triangle = hits[k].own_opaque;
+        if (hits[k].is_hit && (!triangle || m_occluders->owner(*triangle) == m_grid.owner))
             open = std::min(open, static_cast<float>(glm::distance(hits[k].position, middle) / rays[k].distance));
+    }
     return static_cast<double>(open);
 }
 

@@ -41,6 +41,11 @@ constexpr float max_radius = 0.7f;
 // `SurfaceField` tries.
 constexpr float fourth_weight = 25.0f;
 
+// Weight of the squared size, where a cluster faces another way than its targets, beside that of the fourth power. The
+// curvature of pairs across an edge differs from point to point of a cluster, which `spread` does not correct. More:
+// fewer clusters across edges, and larger errors that `SurfaceField` allows elsewhere. 0: blocks take 8 times as long.
+constexpr float edge_weight = 16.0f;
+
 // Samples of one work item.
 constexpr std::size_t at_once = 1024;
 
@@ -154,6 +159,15 @@ void set_frame(const Vec3f& normal, PairSource& cluster)
     cluster.normal = normal;
     cluster.tangent = across(axis);
     cluster.binormal = glm::cross(axis, cluster.tangent);
+}
+
+// Difference of a cluster's normal from that of its targets, less the difference of a body that bends on as the cluster
+// does: pairs of a ball have one curvature. 0 on planes and balls.
+float turn_of_edge(const Vec3f& difference, float variance, float spread, float squared_distance)
+{
+    if (!(spread > 0.0f))
+        return glm::length(difference);
+    return std::sqrt(std::max(0.0f, glm::dot(difference, difference) - variance * squared_distance / spread));
 }
 
 }  // namespace
@@ -308,6 +322,7 @@ void SurfaceTree::gather(const SurfaceBasis& basis, const PairTables& tables, st
         m_nodes[node].light = cluster.position;
         m_nodes[node].spread = 4.0f * cluster.spread;
         m_nodes[node].variance = 1.0f - glm::dot(cluster.normal, cluster.normal);
+        m_nodes[node].normal = cluster.normal;
     }
 }
 
@@ -408,8 +423,18 @@ std::size_t SurfaceTree::Sources::count() const
     return sum;
 }
 
+Vec3f SurfaceTree::mean_normal(std::size_t begin, std::size_t end) const
+{
+    Vec3f sum(0.0f);
+    for (std::size_t leaf = begin; leaf < end; ++leaf)
+        for (const std::uint32_t i : samples_of(leaf))
+            sum += m_samples[i].normal;
+    const float length = glm::length(sum);
+    return length > 0.0f ? sum / length : sum;
+}
+
 // A cluster that is far is so from farther away, too, but for steps of the bound.
-bool SurfaceTree::is_far(const Node& node, float distance, const Opening& opening)
+bool SurfaceTree::is_far(const Node& node, float distance, const Vec3f& normal, const Opening& opening)
 {
     if (distance <= 0.0f || node.light_radius > max_radius * distance)
         return false;
@@ -421,8 +446,9 @@ bool SurfaceTree::is_far(const Node& node, float distance, const Opening& openin
     if (opening.bound.empty() || step < opening.first)
         return false;
     const std::size_t row = std::min<std::size_t>(step - opening.first, opening.bound.size() - 1);
-    const float fourth = fourth_weight * size * size / square;
-    return fourth * node.weight * opening.bound[row] <= 1.0f;
+    const float turned = turn_of_edge(node.normal - normal, node.variance, node.spread, square);
+    const float error = (fourth_weight * size / square + edge_weight * turned) * size;
+    return error * node.weight * opening.bound[row] <= 1.0f;
 }
 
 void SurfaceTree::find_candidates(std::size_t begin, std::size_t end, const Opening& opening, float reach,
@@ -438,6 +464,7 @@ void SurfaceTree::find_candidates(std::size_t begin, std::size_t end, const Open
     }
     const Vec3f middle = 0.5f * (low + high);
     const float radius = 0.5f * glm::length(high - low);
+    const Vec3f normal = mean_normal(begin, end);
     sources.candidates.clear();
     sources.shared.clear();
     sources.waiting.assign(1, 0);
@@ -448,12 +475,12 @@ void SurfaceTree::find_candidates(std::size_t begin, std::size_t end, const Open
         const float distance = glm::length(node.light - middle);
         if (node.weight == 0.0f || distance - radius - node.light_radius > reach)
             continue;
-        if (is_far(node, distance - radius, opening)) {
+        if (is_far(node, distance - radius, normal, opening)) {
             sources.shared.push_back(&m_clusters[number]);
             continue;
         }
         // A leaf stays whole: it may be one of the targets.
-        if (node.end - node.begin <= leaf_size || is_far(node, distance + radius, opening)) {
+        if (node.end - node.begin <= leaf_size || is_far(node, distance + radius, normal, opening)) {
             sources.candidates.push_back(number);
         } else {
             sources.waiting.push_back(node.second);
@@ -467,6 +494,7 @@ void SurfaceTree::find(std::size_t leaf, const Opening& opening, float reach, So
     sources.samples.clear();
     sources.clusters = sources.shared;
     const Node& target = m_nodes[m_leaves[leaf]];
+    const Vec3f normal = mean_normal(leaf, leaf + 1);
     sources.samples.push_back(lit_samples(target));
     sources.waiting.assign(sources.candidates.rbegin(), sources.candidates.rend());
     while (!sources.waiting.empty()) {
@@ -478,7 +506,7 @@ void SurfaceTree::find(std::size_t leaf, const Opening& opening, float reach, So
         const float distance = glm::length(node.light - target.middle) - target.radius;
         if (distance - node.light_radius > reach)
             continue;
-        if (is_far(node, distance, opening)) {
+        if (is_far(node, distance, normal, opening)) {
             sources.clusters.push_back(&m_clusters[number]);
         } else if (node.second == 0) {
             sources.samples.push_back(lit_samples(node));

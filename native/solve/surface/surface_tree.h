@@ -92,6 +92,7 @@ private:
         float weight = 0.0f;        // of its light; 0: dark
         float spread = 0.0f;        // mean squared distance of the light from its position, m^2
         float variance = 0.0f;      // of the normals
+        Vec3f normal{0.0f};         // their mean
     };
 
     // Light of a part of a cluster.
@@ -102,7 +103,10 @@ private:
     };
 
     static bool place(Node& node, ClusterSource& cluster, std::span<const Part> parts);
-    static bool is_far(const Node& node, float distance, const Opening& opening);
+    // Sum of the normals of the samples of leaves [begin, end), over its length.
+    Vec3f mean_normal(std::size_t begin, std::size_t end) const;
+    // `normal`: mean of the targets.
+    static bool is_far(const Node& node, float distance, const Vec3f& normal, const Opening& opening);
     void weigh(const SurfaceBasis& basis, const PairTables& tables, const std::vector<float>& moments);
     std::uint32_t build(std::size_t begin, std::size_t end, bool is_in_leaf);
     void list_lit();
