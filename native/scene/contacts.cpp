@@ -4,6 +4,7 @@
 #include <cmath>
 #include <limits>
 #include <span>
+#include <utility>
 
 #include "base/threads.h"
 #include "scene/shadow_ray.h"
@@ -65,21 +66,26 @@ Others others_near(const ReceiverGrid& grid, const Occluders& occluders, const R
     for (const BentTexel& texel : grid.shape->texels)
         if (texel.is_inside())
             away = std::max(away, height_of_rays(start, texel));
+    const Vec3 low = grid.shape->low - away;
+    const Vec3 high = grid.shape->high + away;
+    const auto meets = [&](const Vec3& other_low, const Vec3& other_high) {
+        return glm::all(glm::lessThanEqual(other_low, high)) && glm::all(glm::greaterThanEqual(other_high, low));
+    };
     Others near;
-    for (std::size_t i = 0; i < occluders.own_opaque_count(); ++i) {
-        if (occluders.owner(i) == grid.owner)
-            continue;
-        const std::array<Vec3, 3> triangle = occluders.triangle(i);
-        Box of_triangle;
-        for (const Vec3& corner : triangle)
-            of_triangle.include(corner);
-        const Vec3 low = glm::max(of_triangle.low - away, grid.shape->low);
-        const Vec3 high = glm::min(of_triangle.high + away, grid.shape->high);
-        if (glm::any(glm::greaterThan(low, high)))
-            continue;
-        near.box.include(low);
-        near.box.include(high);
-        near.rounding = std::max(near.rounding, height_rounding(triangle, occluders.origin(), Vec3(1.0)));
+    std::size_t first = 0;
+    for (const OccluderPart& part : occluders.opaque_parts()) {
+        const bool is_near = part.owner != grid.owner && meets(part.low, part.high);
+        for (std::size_t i = std::exchange(first, part.end); i < part.end && is_near; ++i) {
+            const std::array<Vec3, 3> triangle = occluders.triangle(i);
+            Box box;
+            for (const Vec3& corner : triangle)
+                box.include(corner);
+            if (!meets(box.low, box.high))
+                continue;
+            near.box.include(glm::max(box.low - away, grid.shape->low));
+            near.box.include(glm::min(box.high + away, grid.shape->high));
+            near.rounding = std::max(near.rounding, height_rounding(triangle, occluders.origin(), Vec3(1.0)));
+        }
     }
     return near;
 }

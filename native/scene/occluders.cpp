@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <stdexcept>
 #include <string>
 
@@ -149,16 +150,12 @@ void leave_out_others(const RTCFilterFunctionNArguments* hits)
 }  // namespace
 
 struct Occluders::Hierarchy {
-    // Opaque triangles outside of instances up to `end` that no earlier entry has.
-    struct Owner {
-        std::size_t end;
-        std::uint32_t number;
-        bool is_mirrored;  // true if the placement is
-    };
+    const OccluderPart& part(std::size_t index) const
+    {
+        return *std::ranges::upper_bound(opaque_parts, index, {}, &OccluderPart::end);
+    }
 
-    const Owner& owner(std::size_t index) const { return *std::ranges::upper_bound(owners, index, {}, &Owner::end); }
-
-    std::vector<Owner> owners;
+    std::vector<OccluderPart> opaque_parts;
     // An instance of a set, by its placement relative to the origin.
     struct Instance {
         const TriangleSet* set;
@@ -209,9 +206,17 @@ void Occluders::build(std::span<const OccluderMesh> meshes, std::size_t max_copi
     TriangleSet& own = *m_hierarchy->sets.front();
     for (std::size_t i = 0; i < meshes.size(); ++i) {
         for (const Placement& placement : copied[i].placements) {
+            const std::size_t first = own.opaque_count();
             own.add(meshes[i], placement, m_origin);
-            m_hierarchy->owners.push_back(
-                {own.opaque_count(), placement.owner, glm::determinant(placement.linear) < 0.0});
+            OccluderPart part{own.opaque_count(), placement.owner, glm::determinant(placement.linear) < 0.0,
+                              Vec3(std::numeric_limits<double>::infinity()),
+                              Vec3(-std::numeric_limits<double>::infinity())};
+            for (std::size_t k = first; k < part.end; ++k)
+                for (const Vec3& corner : triangle(k)) {
+                    part.low = glm::min(part.low, corner);
+                    part.high = glm::max(part.high, corner);
+                }
+            m_hierarchy->opaque_parts.push_back(part);
         }
         if (copied[i].placements.size() < meshes[i].placements.size())
             add_instances(meshes[i]);
@@ -275,15 +280,20 @@ std::array<Vec3, 3> Occluders::triangle(std::size_t index) const
     return {m_origin + Vec3(a), m_origin + Vec3(b), m_origin + Vec3(c)};
 }
 
+std::span<const OccluderPart> Occluders::opaque_parts() const
+{
+    return m_hierarchy ? std::span<const OccluderPart>(m_hierarchy->opaque_parts) : std::span<const OccluderPart>();
+}
+
 std::uint32_t Occluders::owner(std::size_t index) const
 {
-    return m_hierarchy->owner(index).number;
+    return m_hierarchy->part(index).owner;
 }
 
 Vec3 Occluders::normal(std::size_t index) const
 {
     const auto [a, b, c] = triangle(index);
-    return glm::cross(b - a, c - a) * (m_hierarchy->owner(index).is_mirrored ? -1.0 : 1.0);
+    return glm::cross(b - a, c - a) * (m_hierarchy->part(index).is_mirrored ? -1.0 : 1.0);
 }
 
 void Occluders::transmit(std::span<const ShadowRay> rays, Vec3f* transmittance, bool is_coherent) const

@@ -53,6 +53,15 @@ struct Hull {
     }
 };
 
+// Opaque triangles outside of instances, before `end` and from that of the part before on: those of one mesh in one place.
+struct OccluderPart {
+    std::size_t end;
+    std::uint32_t owner;
+    bool is_mirrored;  // true if the placement is
+    Vec3 low;          // box around them, world; nothing if there are none
+    Vec3 high;
+};
+
 struct OccluderSettings {
     // Number of see-through triangles that a ray crosses; it ends at the next.
     int max_crossings = std::numeric_limits<int>::max();
@@ -109,6 +118,7 @@ public:
     std::size_t own_opaque_count() const;
     // World corners of such a triangle, rounded as rays meet them.
     std::array<Vec3, 3> triangle(std::size_t index) const;
+    std::span<const OccluderPart> opaque_parts() const;
     // Number of the object that such an opaque triangle belongs to, and a vector along the normal of its front.
     std::uint32_t owner(std::size_t index) const;
     Vec3 normal(std::size_t index) const;
