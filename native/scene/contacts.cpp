@@ -54,7 +54,8 @@ struct Box {
     }
 };
 
-// Where triangles of other objects may be nearer to a mesh than rays start, and the largest error of their heights.
+// A box around the places of a mesh to which triangles of other objects may be nearer than rays start, and the largest
+// error of the heights of these triangles.
 struct Others {
     Box box;
     double rounding = 0.0;
@@ -122,7 +123,7 @@ std::vector<std::uint8_t> covered_texels(const ReceiverGrid& grid, const Occlude
         const std::size_t first = packet * Occluders::packet_size;
         const std::span part =
             std::span(candidates).subspan(first, std::min(candidates.size() - first, Occluders::packet_size));
-        // From where rays start to the face, and beyond both by errors of heights.
+        // Each ray runs from where light rays start down to the face. It is longer at both ends by the error of heights.
         std::array<ShadowRay, Occluders::packet_size> rays;
         for (std::size_t k = 0; k < part.size(); ++k) {
             const BentTexel& texel = texels[part[k]];

@@ -124,6 +124,25 @@ void set_ray(RTCRay16& packet, std::size_t i, const ShadowRay& ray, const Vec3& 
     packet.id[i] = static_cast<unsigned>(i);
 }
 
+// Rays that look for the nearest triangle. Filters of see-through triangles see shadow rays alone.
+struct HitPacket {
+    HitPacket(std::span<const ShadowRay> all, const Vec3& origin)
+    {
+        for (std::size_t i = 0; i < all.size(); ++i) {
+            set_ray(rays.ray, i, all[i], origin);
+            rays.hit.geomID[i] = RTC_INVALID_GEOMETRY_ID;
+            rays.hit.instID[0][i] = RTC_INVALID_GEOMETRY_ID;
+            valid[i] = -1;
+        }
+    }
+
+    void trace(RTCScene scene, RTCIntersectContext& context) { rtcIntersect16(valid.data(), scene, &context, &rays); }
+    bool is_hit(std::size_t i) const { return rays.hit.geomID[i] != RTC_INVALID_GEOMETRY_ID; }
+
+    alignas(64) std::array<int, Occluders::packet_size> valid{};
+    RTCRayHit16 rays{};
+};
+
 // Context that Embree passes to the filter below.
 struct CountContext : RTCIntersectContext {
     const TriangleSet* set;  // of triangles outside of instances
@@ -345,47 +364,33 @@ void Occluders::find_surfaces(std::span<const ShadowRay> rays, SurfaceHit* hits,
     std::fill_n(hits, rays.size(), SurfaceHit{});
     if (!m_hierarchy || rays.empty())
         return;
-    alignas(64) std::array<int, packet_size> valid{};
-    RTCRayHit16 packet{};
-    for (std::size_t i = 0; i < rays.size(); ++i) {
-        set_ray(packet.ray, i, rays[i], m_origin);
-        packet.hit.geomID[i] = RTC_INVALID_GEOMETRY_ID;
-        packet.hit.instID[0][i] = RTC_INVALID_GEOMETRY_ID;
-        valid[i] = -1;
-    }
+    HitPacket packet(rays, m_origin);
     RTCIntersectContext context;
     rtcInitIntersectContext(&context);
     context.flags =
         m_hulls.empty() && is_coherent ? RTC_INTERSECT_CONTEXT_FLAG_COHERENT : RTC_INTERSECT_CONTEXT_FLAG_INCOHERENT;
-    rtcIntersect16(valid.data(), m_hierarchy->top.get(), &context, &packet);
+    packet.trace(m_hierarchy->top.get(), context);
+    const RTCHit16& found = packet.rays.hit;
     for (std::size_t i = 0; i < rays.size(); ++i)
-        if (packet.hit.geomID[i] != RTC_INVALID_GEOMETRY_ID)
-            hits[i] = hit_on(packet.hit.instID[0][i], packet.hit.geomID[i], packet.hit.primID[i],
-                             {packet.hit.u[i], packet.hit.v[i]}, rays[i].direction);
+        if (packet.is_hit(i))
+            hits[i] = hit_on(found.instID[0][i], found.geomID[i], found.primID[i], {found.u[i], found.v[i]},
+                             rays[i].direction);
 }
 
 std::uint32_t Occluders::meet(std::span<const ShadowRay> rays, const CountTriangle& counts) const
 {
     if (!m_hierarchy || rays.empty())
         return 0;
-    alignas(64) std::array<int, packet_size> valid{};
-    RTCRayHit16 packet{};
-    for (std::size_t i = 0; i < rays.size(); ++i) {
-        set_ray(packet.ray, i, rays[i], m_origin);
-        packet.hit.geomID[i] = RTC_INVALID_GEOMETRY_ID;
-        packet.hit.instID[0][i] = RTC_INVALID_GEOMETRY_ID;
-        valid[i] = -1;
-    }
+    HitPacket packet(rays, m_origin);
     CountContext context;
     context.set = m_hierarchy->sets.front().get();
     context.counts = &counts;
     rtcInitIntersectContext(&context);
     context.filter = &leave_out_others;
-    // Not a search for any triangle: filters of see-through ones take part in those.
-    rtcIntersect16(valid.data(), m_hierarchy->top.get(), &context, &packet);
+    packet.trace(m_hierarchy->top.get(), context);
     std::uint32_t bits = 0;
     for (std::size_t i = 0; i < rays.size(); ++i)
-        bits |= static_cast<std::uint32_t>(packet.hit.geomID[i] != RTC_INVALID_GEOMETRY_ID) << i;
+        bits |= static_cast<std::uint32_t>(packet.is_hit(i)) << i;
     return bits;
 }
 
