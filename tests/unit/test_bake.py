@@ -1,6 +1,7 @@
 """The bake of plain data: lights add up, colours and thickness act per channel, progress and cancel work."""
 
 import math
+import pickle
 from dataclasses import replace
 
 import beamspread
@@ -88,6 +89,17 @@ def test_receivers_near_each_other_share_the_shadows_of_their_scene():
     assert under_roof.caster(shifted(square(), 3.0)) is near
     assert under_roof.caster(shifted(square(), 1e4)) is not near
     assert Illumination([SUN]).caster(square()) is None
+
+
+def test_the_shadows_of_a_scene_are_found_once_for_all_its_light_but_not_sent_elsewhere():
+    scene = Illumination([SUN], ROOF)
+    caster = scene.with_messages().caster(square())
+    others = scene.lighting("Plane"), scene.with_lights([]), scene.lit_by([SUN]), scene.without({"World"})
+    for other in (scene, *others, scene.with_light_of(Illumination([SUN], ROOF))):
+        assert other.caster(square()) is caster
+    elsewhere = pickle.loads(pickle.dumps(scene))
+    assert elsewhere.caster(square()) is not caster
+    assert elsewhere.caster(square()).triangle_count == 1
 
 
 def test_lights_share_the_shadows_of_their_blockers():

@@ -54,6 +54,12 @@ class Illumination:
         """State without the hierarchies, which another process builds again."""
         return {**self.__dict__, "_casters": {}}
 
+    def __copy__(self) -> Illumination:
+        """A copy that shares the hierarchies."""
+        same = object.__new__(type(self))
+        same.__dict__.update(self.__dict__)
+        return same
+
     def lighting(self, receiver: str) -> Illumination:
         """A copy with the lights that are linked to an object of that name; shares the hierarchies."""
         linked = copy(self)
@@ -164,15 +170,16 @@ class Illumination:
         serve all receivers with the same origin, and all lights with the same blockers.
         """
         origin = self._origin(grid)
-        if any(cached_origin != origin for cached_origin, _ in self._casters):
+        if any(cached_origin != origin for cached_origin, _ in list(self._casters)):
             self._casters.clear()  # first, because each may take gigabytes
         blockers = light.blockers if light else None
         names = {occluder.name for occluder in self._occluders}
         chosen = None if blockers is None or names <= blockers else frozenset(names & blockers)
-        if (origin, chosen) not in self._casters:
+        caster = self._casters.get((origin, chosen))
+        if caster is None:
             occluders = [occluder for occluder in self._occluders if chosen is None or occluder.name in chosen]
-            self._casters[origin, chosen] = build(occluders, origin, self._max_crossings)
-        return self._casters[origin, chosen]
+            caster = self._casters[origin, chosen] = build(occluders, origin, self._max_crossings)
+        return caster
 
 
 def _divided(lights: Iterable[Light]) -> tuple[tuple[Light, ...], list[Message]]:
