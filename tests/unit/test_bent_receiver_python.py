@@ -196,3 +196,25 @@ def test_the_sides_of_an_image_by_faces_are_those_by_triangles():
     assert lengths_of_faces(ball()) == pytest.approx(island.lengths, rel=0.01)
     (chart,) = build_receiver(mesh, *texture_size(mesh, 96)).charts
     assert pieces_of_faces(ball()) == pytest.approx(chart.grid.pieces, rel=0.1)  # which has few texels at the poles
+
+
+def test_light_that_few_texels_face_is_not_behind_the_mesh():
+    """A flat square with one texel that is tilted: some texels alone don't tell."""
+    grid, _, _ = grid_of(ball())
+    tilted = np.zeros_like(grid.areas, bool)
+    row, column = np.argwhere(grid.areas > 0)[3]
+    tilted[row, column] = True
+    up, aside = np.float32((0, 0, 1)), np.float32((0.8, 0, 0.6))
+    middles = np.zeros_like(grid.middles)
+    normals = np.where(tilted[..., None], aside, up) * (grid.areas > 0)[..., None]
+    square = replace(grid, middles=middles, normals=np.float32(normals))
+    assert square.faces((1.0, 0.0, -0.5))
+    assert square.faces((0.0, 0.0, 0.1))
+    assert square.faces((0.0, 0.0, -0.1), 0.2)
+    assert not square.faces((-1.0, 0.0, -0.5))
+    assert not square.faces((0.0, 0.0, -0.1), 0.05)
+    assert square.meets((-0.8, 0.0, 0.6))
+    assert not square.meets((0.8, 0.0, 0.6))
+    assert square.meets((0.8, 0.0, 0.6), 0.61)
+    assert not PointLight("Lamp", 1.0, (1, 1, 1), True, (1.0, 0.0, -0.5)).is_behind(square)
+    assert SunLight("Sun", 1.0, (1, 1, 1), True, (0.8, 0.0, 0.6)).is_behind(square)

@@ -373,3 +373,9 @@ def test_chosen_faces_have_the_areas_of_a_mesh_of_their_own():
     assert mesh.areas.max() == 6  # computed before faces are chosen
     np.testing.assert_array_equal(mesh.of_faces(np.array(chosen)).areas, expected)
     np.testing.assert_array_equal(mesh.of_faces(np.array(chosen)).area_vectors, mesh.area_vectors[chosen])
+    everything = mesh.of_faces(np.arange(mesh.count))
+    assert everything.areas is mesh.areas
+    assert mesh.numbers is None
+    np.testing.assert_array_equal(everything.numbers, np.arange(mesh.count))
+    numbered = mesh.of_faces(np.array(chosen))
+    np.testing.assert_array_equal(numbered.of_faces(np.arange(len(chosen))).numbers, chosen)

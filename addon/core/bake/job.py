@@ -146,6 +146,7 @@ class BakeJob:
         grids = self.grids
         return [*grids, *backs_of(grids)] if has_back(self.surface.thickness, self.settings) else grids
 
+    @cached_property
     def workloads(self) -> list[Workload]:
         """Facts that decide how long the solution takes, for each side from which light comes."""
         grids, _ = with_edges(self.grids, self.surface, self.name)

@@ -107,7 +107,7 @@ class Solve(Step):
 
     def seconds(self, job: BakeJob) -> float:
         textured = textured_seconds(textured_texels(job), job.settings.threads, job.receiver.is_bent)
-        return textured + sum(load.seconds(job.settings) for load in job.workloads())
+        return textured + sum(load.seconds(job.settings) for load in job.workloads)
 
     def kind(self, job: BakeJob) -> str:
         return self.kind_for(job.settings)

@@ -11,9 +11,12 @@ from ..native import native
 from .grid import Grid, Vector, owner_number
 from .stretch import pieces_of_texels
 
-# Root of the number of texels among which hollows are looked for, and the depth of one over the surface's size. More
-# texels, less depth: smaller hollows count, and bounced light is looked for in more meshes.
+# Root of the number of texels that are asked first, and among which hollows are looked for; and the depth of a hollow
+# over the surface's size. More texels, less depth: smaller hollows count, and more meshes are asked for bounced light.
 HOLLOW_SIDE, HOLLOW_DEPTH = 24, 0.02
+
+# Root of the number of texels whose pieces are counted. More: better estimates, which take longer.
+PIECES_SIDE = 64
 
 MAX_REACH = 0.02
 """Most of a surface's size that it reaches beyond the middles of its texels. Larger: near objects return no light."""
@@ -66,12 +69,12 @@ class BentGrid:
     def height(self) -> int:
         return self.areas.shape[0]
 
-    @property
+    @cached_property
     def texels(self) -> int:
         """Number of texels that show the mesh."""
         return round(np.count_nonzero(self.areas) * self.finer**2)
 
-    @property
+    @cached_property
     def area(self) -> float:
         """Area of the surface, square scene units."""
         return float(self.areas.sum(dtype=float))
@@ -85,8 +88,9 @@ class BentGrid:
 
     @cached_property
     def pieces(self) -> float:
-        """Mean number of pieces into which the solver divides a texel."""
-        return pieces_of_texels(self.steps_x, self.steps_y, self.areas)
+        """Mean number of pieces into which the solver divides a texel, about: that of some texels."""
+        few = self.coarse(PIECES_SIDE)
+        return pieces_of_texels(few.steps_x, few.steps_y, few.areas)
 
     @property
     def reach(self) -> float:
@@ -116,9 +120,8 @@ class BentGrid:
 
     @cached_property
     def _box(self) -> np.ndarray:
-        shown = self.middles[self.areas > 0]
-        low, high = shown.min(axis=0), shown.max(axis=0)
-        x, y, z = np.meshgrid(*zip(low, high), indexing="ij")
+        columns = self.middles[self.areas > 0].T
+        x, y, z = np.meshgrid(*((column.min(), column.max()) for column in columns), indexing="ij")
         return np.stack([x.ravel(), y.ravel(), z.ravel()], axis=1)
 
     def positions(self, at: tuple[float, float] = (0.5, 0.5)) -> np.ndarray:
@@ -138,8 +141,20 @@ class BentGrid:
 
     def is_hollow(self) -> bool:
         """True if parts of the surface see each other: points of it lie above tangent planes of others."""
-        few = self.coarse(HOLLOW_SIDE)
-        return see_each_other(few.middles.reshape(-1, 3), few.normals.reshape(-1, 3), self.size)
+        return see_each_other(self._few.middles.reshape(-1, 3), self._few.normals.reshape(-1, 3), self.size)
+
+    @cached_property
+    def _few(self) -> BentGrid:
+        """Some of the texels, which answer most questions about all."""
+        return self.coarse(HOLLOW_SIDE)
+
+    def faces(self, point: Vector, radius: float = 0.0) -> bool:
+        """True if a ball around a world point is not wholly behind the tangent planes of all texels."""
+        return any(grid.height_of(point) > -radius for grid in (self._few, self))
+
+    def meets(self, direction: Vector, cosine: float = 0.0) -> bool:
+        """True if the cosine between a unit vector and some normals is below this."""
+        return any(grid.cosine_to(direction) < cosine for grid in (self._few, self))
 
     def cosine_to(self, direction: Vector) -> float:
         """Least cosine between a unit vector and the normals."""

@@ -80,7 +80,7 @@ def bent_part(polygons: Polygons) -> BentPart:
 
 def _outward(polygons: Polygons, corners: np.ndarray, owners: np.ndarray) -> Polygons:
     """Triangles of polygons, which `owners` names, anticlockwise seen from outside."""
-    a, b, c = np.moveaxis(polygons.corners[corners], 1, 0)
+    a, b, c = (polygons.corners[places] for places in corners.T)
     is_turned = np.einsum("ij,ij->i", np.cross(b - a, c - a), polygons.area_vectors[owners]) < 0
     corners = np.where(is_turned[:, None], corners[:, ::-1], corners).ravel()
     numbers = owners if polygons.numbers is None else polygons.numbers[owners]
@@ -131,11 +131,7 @@ def _is_inside_out(polygons: Polygons, body_of: np.ndarray) -> np.ndarray:
     is_inward, is_outward = is_closed & (volumes < 0), is_closed & (volumes > 0)
     if not (is_inward.any() and is_outward.any()):
         return is_inward
-    corners = body_of[polygons.face_of]
-    order = np.argsort(corners, kind="stable")
-    starts = np.searchsorted(corners[order], np.arange(len(volumes)))
-    lows = np.minimum.reduceat(polygons.corners[order], starts)
-    highs = np.maximum.reduceat(polygons.corners[order], starts)
+    lows, highs = _boxes(polygons.corners, body_of[polygons.face_of], len(volumes))
     outer = np.flatnonzero(is_outward)
     for body in np.flatnonzero(is_inward).tolist():
         is_around = (lows[outer] <= lows[body]).all(axis=1) & (highs[outer] >= highs[body]).all(axis=1)
@@ -159,8 +155,8 @@ def _faults(polygons: Polygons, name: str) -> list[Message]:
         text = f"Faces of '{name}' that touch look to opposite sides, {where}"
         remedy = "Recalculate the normals (Edit Mode: Shift N), or check modifiers."
         messages.append(warning(name, text, remedy))
-    counts = np.bincount(same_faces(polygons))
-    is_double = counts[same_faces(polygons)] > 1
+    same = same_faces(polygons)
+    is_double = np.bincount(same)[same] > 1
     part = polygons.areas[is_double].sum() / polygons.areas.sum()
     if part > MIN_FAULT:
         text = f"Faces of '{name}' lie on each other, {part:.0%} of its surface: light counts for each of them there."
@@ -178,15 +174,20 @@ def _loose_parts(polygons: Polygons, body_of: np.ndarray, spread: float, name: s
     place = np.full(len(areas), -1)
     place[largest] = np.arange(len(largest))
     of_corner = place[body_of][polygons.face_of]
-    lows, highs = np.full((len(largest), 3), np.inf), np.full((len(largest), 3), -np.inf)
-    np.minimum.at(lows, of_corner[of_corner >= 0], polygons.corners[of_corner >= 0])
-    np.maximum.at(highs, of_corner[of_corner >= 0], polygons.corners[of_corner >= 0])
+    lows, highs = _boxes(polygons.corners[of_corner >= 0], of_corner[of_corner >= 0], len(largest))
     is_near = (lows[:, None] <= highs[None] + spread).all(axis=2) & (lows[None] <= highs[:, None] + spread).all(axis=2)
     count = int((is_near.sum(axis=1) > 1).sum())
     if not count:
         return []
     text = f"{count} loose parts of '{name}' are near to others: light crosses between them as if they touched."
     return [note(name, text, "Separate them (Edit Mode: P, By Loose Parts) where it should not.")]
+
+
+def _boxes(corners: np.ndarray, body_of: np.ndarray, count: int) -> tuple[np.ndarray, np.ndarray]:
+    """Lowest and highest coordinates (count, 3) of the corners (K, 3) of each body, which has some."""
+    order = np.argsort(body_of, kind="stable")
+    starts = np.searchsorted(body_of[order], np.arange(count))
+    return tuple(reduce.reduceat(corners[order], starts) for reduce in (np.minimum, np.maximum))
 
 
 def _by_order(polygons: Polygons) -> np.ndarray:

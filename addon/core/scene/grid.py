@@ -104,6 +104,14 @@ class Grid:
         """The same of points (N, 3)."""
         return np.subtract(points, self.origin) @ np.array(self.normal)
 
+    def faces(self, point: Vector, radius: float = 0.0) -> bool:
+        """True if a ball around a world point is not wholly behind the plane."""
+        return self.height_of(point) > -radius
+
+    def meets(self, direction: Vector, cosine: float = 0.0) -> bool:
+        """True if the cosine between a unit vector and the normal is below this."""
+        return self.cosine_to(direction) < cosine
+
     def cosine_to(self, direction: Vector) -> float:
         """Cosine between a unit vector and the normal."""
         return float(np.dot(direction, self.normal))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from copy import copy
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -61,10 +62,10 @@ class Polygons:
         """Face of each corner, int (K,)."""
         return np.repeat(np.arange(self.count), self.sizes)
 
-    @property
+    @cached_property
     def diagonal(self) -> float:
         """Length of the diagonal of the box around all corners."""
-        return float(np.linalg.norm(np.ptp(self.corners, axis=0))) if len(self.corners) else 0.0
+        return float(np.linalg.norm([np.ptp(column) for column in self.corners.T])) if len(self.corners) else 0.0
 
     @cached_property
     def is_finite(self) -> np.ndarray:
@@ -98,7 +99,8 @@ class Polygons:
     def points(self) -> np.ndarray:
         """Number of the point of each corner, int (K,): corners at the same position are one point."""
         step = SAME_POINT * max(self.diagonal, 1e-30)
-        cells = np.round((self.corners - self.corners.min(axis=0)) / step).astype(np.int64)
+        low = np.array([column.min() for column in self.corners.T])
+        cells = np.round((self.corners - low) / step).astype(np.int64)
         return np.unique(_mixed(cells), return_inverse=True)[1]
 
     @cached_property
@@ -134,6 +136,8 @@ class Polygons:
 
     def of_faces(self, faces: np.ndarray) -> Polygons:
         """Polygons of these faces alone."""
+        if np.array_equal(faces, np.arange(self.count)):
+            return self._numbered()
         sizes = self.sizes[faces]
         starts = np.concatenate([[0], np.cumsum(sizes)]).astype(int)
         corners = np.repeat(self.starts[:-1][faces] - starts[:-1], sizes) + np.arange(starts[-1])
@@ -146,6 +150,14 @@ class Polygons:
             if name in self.__dict__:  # known already
                 part.__dict__[name] = self.__dict__[name][faces]
         return part
+
+    def _numbered(self) -> Polygons:
+        """The same polygons with `numbers`, and all that is known of them."""
+        if self.numbers is not None:
+            return self
+        same = copy(self)
+        object.__setattr__(same, "numbers", np.arange(self.count))
+        return same
 
     def by_tile(self) -> dict[int, Polygons]:
         """Faces of each UDIM tile, by its number; all by 0 without tiles."""
@@ -175,8 +187,8 @@ class Polygons:
 def same_faces(polygons: Polygons) -> np.ndarray:
     """A number for each face, int (N,), that faces with the same corners share."""
     keys = np.random.default_rng(0).random(polygons.points.max(initial=0) + 1)
-    faces = np.column_stack([sums(keys[polygons.points], polygons.starts), polygons.sizes])
-    return np.unique(np.round(faces, 9), axis=0, return_inverse=True)[1].ravel()
+    faces = np.column_stack([1e9 * sums(keys[polygons.points], polygons.starts), polygons.sizes])
+    return np.unique(_mixed(np.round(faces).astype(np.int64)), return_inverse=True)[1].ravel()
 
 
 def sums(values: np.ndarray, starts: np.ndarray) -> np.ndarray:
@@ -218,9 +230,8 @@ def components(count: int, first: np.ndarray, second: np.ndarray) -> np.ndarray:
 
 
 def _mixed(cells: np.ndarray) -> np.ndarray:
-    """A number for each row of integers (K, 3); different rows have different ones but for 1 in 2^40 pairs or so."""
-    mixed = cells.astype(np.uint64)
+    """A number for each row of integers (K, 1 to 3); different rows have different ones but for 1 in 2^40 pairs."""
+    factors = 0x9E3779B97F4A7C15, 0xC2B2AE3D27D4EB4F, 0x165667B19E3779F9
     with np.errstate(over="ignore"):
-        keys = mixed[:, 0] * np.uint64(0x9E3779B97F4A7C15) + mixed[:, 1] * np.uint64(0xC2B2AE3D27D4EB4F)
-        keys = keys + mixed[:, 2] * np.uint64(0x165667B19E3779F9)
+        keys = sum(column * np.uint64(factor) for column, factor in zip(cells.astype(np.uint64).T, factors))
     return keys ^ (keys >> np.uint64(29))

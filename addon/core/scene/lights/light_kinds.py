@@ -120,7 +120,7 @@ class SunLight(Light):
     has_one_direction = is_parallel
 
     def is_behind(self, grid):
-        return bool(grid.cosine_to(self.direction) >= math.sin(min(0.5 * self.angle, 0.5 * math.pi)))
+        return not grid.meets(self.direction, math.sin(min(0.5 * self.angle, 0.5 * math.pi)))
 
 
 @dataclass(frozen=True)
@@ -151,7 +151,7 @@ class PointLight(Light):
         return not self.has_size
 
     def is_behind(self, grid):
-        return grid.height_of(self.position) <= -self.radius
+        return not grid.faces(self.position, self.radius)
 
 
 @dataclass(frozen=True)
@@ -212,7 +212,7 @@ class AreaLight(Light):
         half_x = 0.5 * self.size_x * grid.length_across(self.frame[0])
         half_y = 0.5 * self.size_y * grid.length_across(self.frame[1])
         reach = np.hypot(half_x, half_y) if self.is_round else half_x + half_y
-        if grid.height_of(self.position) + reach <= 0:
+        if not grid.faces(self.position, reach):
             return True
         return bool(((grid.corners() - self.position) @ np.array(self.frame[2]) >= 0).all())
 
