@@ -19,32 +19,39 @@ constexpr std::size_t lanes = 16;
 constexpr std::size_t vectors = texels_per_run / lanes;
 using Texels = float __attribute__((vector_size(lanes * sizeof(float))));
 
-[[gnu::always_inline]] inline void load(const float* values, std::array<Texels, vectors>& texels)
+[[gnu::always_inline]] inline Texels load(const float* values)
 {
-    std::memcpy(texels.data(), values, sizeof(texels));
+    Texels texels;
+    std::memcpy(&texels, values, sizeof(texels));
+    return texels;
 }
 
 void add_path_products(const PlacedPaths& paths, std::size_t count, float scale, const float* light,
                        const float* entering, const float* albedo, float* textured, float* plain)
 {
     std::array<Texels, vectors> sum, plain_sum;
-    load(textured, sum);
-    load(plain, plain_sum);
+    for (std::size_t v = 0; v < vectors; ++v) {
+        sum[v] = load(textured + v * lanes);
+        plain_sum[v] = load(plain + v * lanes);
+    }
+    const std::ptrdiff_t* const places = paths.places.data();
     for (std::size_t p = 0; p < count; ++p) {
-        const std::ptrdiff_t* place = paths.places.data() + paths.first[p];
-        const std::ptrdiff_t* const end = paths.places.data() + paths.first[p + 1];
-        std::array<Texels, vectors> product, factor;
-        load(light + *place, product);
-        for (std::size_t v = 0; v < vectors; ++v)
-            product[v] *= scale;
-        load(entering + *place, factor);
-        for (std::size_t v = 0; v < vectors; ++v)
-            plain_sum[v] += paths.weight[p] * (product[v] * factor[v]);
-        while (++place < end) {
-            load(albedo + *place, factor);
-            for (std::size_t v = 0; v < vectors; ++v)
-                product[v] *= factor[v];
+        const std::ptrdiff_t* place = places + paths.first[p];
+        const std::ptrdiff_t* const end = places + paths.first[p + 1];
+        const float weight = paths.weight[p];
+        Texels product[vectors];
+#pragma GCC unroll 8
+        for (std::size_t v = 0; v < vectors; ++v) {
+            product[v] = load(light + *place + v * lanes) * scale;
+            plain_sum[v] += weight * (product[v] * load(entering + *place + v * lanes));
         }
+        while (++place < end) {
+            const float* const at = albedo + *place;
+#pragma GCC unroll 8
+            for (std::size_t v = 0; v < vectors; ++v)
+                product[v] *= load(at + v * lanes);
+        }
+#pragma GCC unroll 8
         for (std::size_t v = 0; v < vectors; ++v)
             sum[v] += product[v];
     }
