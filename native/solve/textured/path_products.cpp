@@ -15,48 +15,50 @@ HWY_BEFORE_NAMESPACE();
 namespace beamspread {
 namespace HWY_NAMESPACE {
 
-constexpr std::size_t lanes = 16;
-constexpr std::size_t vectors = texels_per_run / lanes;
-using Texels = float __attribute__((vector_size(lanes * sizeof(float))));
+using Row = float __attribute__((vector_size(tile_columns * sizeof(float))));
 
-[[gnu::always_inline]] inline Texels load(const float* values)
+// Multiplies by a row of texels.
+[[gnu::always_inline]] inline void multiply(Row& product, const float* values)
 {
-    Texels texels;
-    std::memcpy(&texels, values, sizeof(texels));
-    return texels;
+    Row row;
+    std::memcpy(&row, values, sizeof(row));
+    product *= row;
 }
 
-void add_path_products(const PlacedPaths& paths, std::size_t count, float scale, const float* light,
-                       const float* entering, const float* albedo, float* textured, float* plain)
+void add_path_products(const PlacedPaths& paths, std::size_t count, float scale, const TilePlanes& planes,
+                       float* textured, float* plain)
 {
-    std::array<Texels, vectors> sum, plain_sum;
-    for (std::size_t v = 0; v < vectors; ++v) {
-        sum[v] = load(textured + v * lanes);
-        plain_sum[v] = load(plain + v * lanes);
-    }
-    const std::ptrdiff_t* const places = paths.places.data();
+    std::array<Row, tile_rows> sum, plain_sum;
+    std::memcpy(&sum, textured, sizeof(sum));
+    std::memcpy(&plain_sum, plain, sizeof(plain_sum));
+    const std::ptrdiff_t stride = planes.stride;
     for (std::size_t p = 0; p < count; ++p) {
-        const std::ptrdiff_t* place = places + paths.first[p];
-        const std::ptrdiff_t* const end = places + paths.first[p + 1];
+        const std::ptrdiff_t* place = paths.places.data() + paths.first[p];
+        const std::ptrdiff_t* const end = paths.places.data() + paths.first[p + 1];
         const float weight = paths.weight[p];
-        Texels product[vectors];
-#pragma GCC unroll 8
-        for (std::size_t v = 0; v < vectors; ++v) {
-            product[v] = load(light + *place + v * lanes) * scale;
-            plain_sum[v] += weight * (product[v] * load(entering + *place + v * lanes));
+        // Unrolled, since an array that is indexed would be kept in memory.
+        std::array<Row, tile_rows> product;
+#pragma GCC unroll 16
+        for (std::size_t r = 0; r < tile_rows; ++r) {
+            const std::ptrdiff_t at = *place + static_cast<std::ptrdiff_t>(r) * stride;
+            std::memcpy(&product[r], planes.light + at, sizeof(Row));
+            product[r] *= scale;
+            Row plain_product = product[r];
+            multiply(plain_product, planes.entering + at);
+            plain_sum[r] += weight * plain_product;
         }
         while (++place < end) {
-            const float* const at = albedo + *place;
-#pragma GCC unroll 8
-            for (std::size_t v = 0; v < vectors; ++v)
-                product[v] *= load(at + v * lanes);
+            const float* const albedo = planes.albedo + *place;
+#pragma GCC unroll 16
+            for (std::size_t r = 0; r < tile_rows; ++r)
+                multiply(product[r], albedo + static_cast<std::ptrdiff_t>(r) * stride);
         }
-#pragma GCC unroll 8
-        for (std::size_t v = 0; v < vectors; ++v)
-            sum[v] += product[v];
+#pragma GCC unroll 16
+        for (std::size_t r = 0; r < tile_rows; ++r)
+            sum[r] += product[r];
     }
-    std::memcpy(textured, sum.data(), sizeof(sum));
-    std::memcpy(plain, plain_sum.data(), sizeof(plain_sum));
+    std::memcpy(textured, &sum, sizeof(sum));
+    std::memcpy(plain, &plain_sum, sizeof(plain_sum));
 }
 
 }  // namespace HWY_NAMESPACE
@@ -68,10 +70,10 @@ namespace beamspread {
 
 HWY_EXPORT(add_path_products);
 
-void add_path_products(const PlacedPaths& paths, std::size_t count, float scale, const float* light,
-                       const float* entering, const float* albedo, float* textured, float* plain)
+void add_path_products(const PlacedPaths& paths, std::size_t count, float scale, const TilePlanes& planes,
+                       float* textured, float* plain)
 {
-    HWY_DYNAMIC_DISPATCH(add_path_products)(paths, count, scale, light, entering, albedo, textured, plain);
+    HWY_DYNAMIC_DISPATCH(add_path_products)(paths, count, scale, planes, textured, plain);
 }
 
 }  // namespace beamspread

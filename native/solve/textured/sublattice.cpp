@@ -16,15 +16,15 @@ std::ptrdiff_t floor_div(std::ptrdiff_t value, std::ptrdiff_t divisor)
 Sublattices::Sublattices(std::size_t width, std::size_t height, std::size_t side, std::size_t reach)
     : m_width(width), m_height(height), m_side(side)
 {
-    m_rows = (height + m_side - 1) / m_side;
-    m_runs = ((width + m_side - 1) / m_side + texels_per_run - 1) / texels_per_run;
+    m_tiles_down = (height + m_side * tile_rows - 1) / (m_side * tile_rows);
+    m_tiles_across = (width + m_side * tile_columns - 1) / (m_side * tile_columns);
     m_reach = std::min(reach, std::max(width, height));
     m_border = (m_reach + m_side - 1) / m_side + 1;
 }
 
-std::size_t Sublattices::run(std::size_t row, std::size_t number) const
+std::size_t Sublattices::tile(std::size_t down, std::size_t across) const
 {
-    return (row + m_border) * (m_runs * texels_per_run + 2 * m_border) + m_border + number * texels_per_run;
+    return (down * tile_rows + m_border) * stride() + m_border + across * tile_columns;
 }
 
 bool Sublattices::is_within(const PathPlace& place) const
@@ -40,15 +40,15 @@ std::ptrdiff_t Sublattices::offset(std::size_t sublattice, const PathPlace& plac
     const std::ptrdiff_t x = static_cast<std::ptrdiff_t>(sublattice % m_side) + std::clamp(place.x, -reach, reach);
     const std::ptrdiff_t y = static_cast<std::ptrdiff_t>(sublattice / m_side) + std::clamp(place.y, -reach, reach);
     const std::ptrdiff_t across = floor_div(x, side), up = floor_div(y, side);
-    const auto stride = static_cast<std::ptrdiff_t>(m_runs * texels_per_run + 2 * m_border);
-    const auto plane = stride * static_cast<std::ptrdiff_t>(m_rows + 2 * m_border);
-    return ((y - up * side) * side + x - across * side) * plane + up * stride + across;
+    const auto row = static_cast<std::ptrdiff_t>(stride());
+    const auto plane = row * static_cast<std::ptrdiff_t>(m_tiles_down * tile_rows + 2 * m_border);
+    return ((y - up * side) * side + x - across * side) * plane + up * row + across;
 }
 
 AlignedVector<float> Sublattices::dealt(const View2D<const float>& values, float factor, bool goes_on) const
 {
-    const std::size_t stride = m_runs * texels_per_run + 2 * m_border, rows = m_rows + 2 * m_border;
-    AlignedVector<float> plane(count() * rows * stride);
+    const std::size_t columns = stride(), rows = m_tiles_down * tile_rows + 2 * m_border;
+    AlignedVector<float> plane(count() * rows * columns);
     const auto side = static_cast<std::ptrdiff_t>(m_side), border = static_cast<std::ptrdiff_t>(m_border);
     const auto width = static_cast<std::ptrdiff_t>(m_width), height = static_cast<std::ptrdiff_t>(m_height);
     parallel_for(count() * rows, [&](std::size_t task) {
@@ -57,8 +57,8 @@ AlignedVector<float> Sublattices::dealt(const View2D<const float>& values, float
         if (!goes_on && (y < 0 || y >= height))
             return;
         const auto row = static_cast<std::size_t>(std::clamp<std::ptrdiff_t>(y, 0, height - 1));
-        float* const filled = plane.data() + task * stride;
-        for (std::size_t column = 0; column < stride; ++column) {
+        float* const filled = plane.data() + task * columns;
+        for (std::size_t column = 0; column < columns; ++column) {
             const std::ptrdiff_t x = (static_cast<std::ptrdiff_t>(column) - border) * side + sublattice % side;
             if (goes_on || (x >= 0 && x < width))
                 filled[column] =

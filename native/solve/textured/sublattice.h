@@ -22,30 +22,34 @@ public:
     std::size_t side() const { return m_side; }
     std::size_t count() const { return m_side * m_side; }
     std::size_t reach() const { return m_reach; }
-    // Rows of a sublattice, and runs of `texels_per_run` texels in each.
-    std::size_t rows() const { return m_rows; }
-    std::size_t runs() const { return m_runs; }
+    // Tiles of `tile_rows` by `tile_columns` texels in each sublattice.
+    std::size_t tiles_down() const { return m_tiles_down; }
+    std::size_t tiles_across() const { return m_tiles_across; }
+    std::size_t tile_count() const { return m_tiles_down * m_tiles_across; }
 
-    // Index in a plane of the first texel of a run of a sublattice.
-    std::size_t run(std::size_t row, std::size_t number) const;
+    // Index in a plane of the first texel of a tile of the first sublattice.
+    std::size_t tile(std::size_t down, std::size_t across) const;
 
-    // The index of a place, less that of the run of texels that light leaves, which are of this sublattice.
+    // Texels from a row of a plane to the next.
+    std::size_t stride() const { return m_tiles_across * tile_columns + 2 * m_border; }
+
+    // The index of a place, less that of the tile of texels that light leaves, which are of this sublattice.
     std::ptrdiff_t offset(std::size_t sublattice, const PathPlace& place) const;
     bool is_within(const PathPlace& place) const;
 
     // A plane of these sublattices. Beyond the border values continue, or they are 0.
     AlignedVector<float> dealt(const View2D<const float>& values, float factor, bool goes_on) const;
 
-    // Calls set(y, x, index in a plane without borders of this sublattice) for each texel.
+    // Calls set(y, x, index in the tiles of this sublattice, one after the other) for each texel.
     template <class Set>
     void for_texels(std::size_t sublattice, const Set& set) const
     {
-        for (std::size_t row = 0; row < m_rows; ++row) {
-            const std::size_t y = row * m_side + sublattice / m_side;
-            for (std::size_t column = 0; y < m_height && column < m_runs * texels_per_run; ++column) {
-                const std::size_t x = column * m_side + sublattice % m_side;
-                if (x < m_width)
-                    set(y, x, row * m_runs * texels_per_run + column);
+        for (std::size_t y = sublattice / m_side; y < m_height; y += m_side) {
+            const std::size_t row = y / m_side;
+            const std::size_t first = row / tile_rows * m_tiles_across * tile_texels + row % tile_rows * tile_columns;
+            for (std::size_t x = sublattice % m_side; x < m_width; x += m_side) {
+                const std::size_t column = x / m_side;
+                set(y, x, first + column / tile_columns * tile_texels + column % tile_columns);
             }
         }
     }
@@ -54,8 +58,8 @@ private:
     std::size_t m_width;
     std::size_t m_height;
     std::size_t m_side;  // sublattices along each axis
-    std::size_t m_rows;
-    std::size_t m_runs;
+    std::size_t m_tiles_down;
+    std::size_t m_tiles_across;
     std::size_t m_border;  // around each sublattice, its texels
     std::size_t m_reach;
 };

@@ -132,8 +132,8 @@ public:
         std::atomic<std::size_t> places{0};
         parallel_for(2 * m_sublattices.count(), [&](std::size_t task) {
             const std::size_t half = task / m_sublattices.count(), sublattice = task % m_sublattices.count();
-            const std::size_t run_count = m_sublattices.rows() * m_sublattices.runs();
-            AlignedVector<float> textured(run_count * texels_per_run), plain(run_count * texels_per_run);
+            const std::size_t tiled = m_sublattices.tile_count() * tile_texels;
+            AlignedVector<float> textured(tiled), plain(tiled);
             std::size_t taken = 0;
             for (std::size_t i = 0; i < m_plans.size(); ++i) {
                 Random random(m_problem.seed + m_rounds, path_stream, task * m_plans.size() + i);
@@ -149,8 +149,8 @@ public:
             });
             advance(1.0 / static_cast<double>(2 * m_sublattices.count()));
         });
-        const std::size_t runs = m_sublattices.count() * m_sublattices.rows() * m_sublattices.runs();
-        m_products += static_cast<double>(places) * static_cast<double>(texels()) / static_cast<double>(runs);
+        const std::size_t tiles = m_sublattices.count() * m_sublattices.tile_count();
+        m_products += static_cast<double>(places) * static_cast<double>(texels()) / static_cast<double>(tiles);
     }
 
     // Scatterings of all texels in the walks so far.
@@ -232,7 +232,7 @@ private:
         return plans;
     }
 
-    // Adds the paths of a light, as many of them as belong to each run of texels of all `walks`; the places that they pass.
+    // Adds the paths of a light, as many of them as belong to each tile of all `walks`; the places that they pass.
     std::size_t add_products(const SharedPaths& paths, std::size_t walks, std::size_t sublattice, std::size_t light,
                              float* textured, float* plain) const
     {
@@ -252,18 +252,19 @@ private:
         }
         const PlacedPaths placed{places, first, weights};
         std::size_t passed = 0;
-        for (std::size_t row = 0; row < m_sublattices.rows(); ++row) {
-            for (std::size_t number = 0; number < m_sublattices.runs(); ++number) {
-                const std::size_t own = m_shares.walks(light, row, number, walks);
+        for (std::size_t down = 0; down < m_sublattices.tiles_down(); ++down) {
+            for (std::size_t across = 0; across < m_sublattices.tiles_across(); ++across) {
+                const std::size_t own = m_shares.walks(light, down, across, walks);
                 const auto count = static_cast<std::size_t>(std::ranges::lower_bound(walk, own) - walk.begin());
                 if (count == 0)
                     continue;
                 // Fewer walks count more.
                 const float scale = static_cast<float>(walks) / static_cast<float>(own);
-                const std::size_t at = m_sublattices.run(row, number);
-                const std::size_t to = (row * m_sublattices.runs() + number) * texels_per_run;
-                add_path_products(placed, count, scale, m_light[light].data() + at, m_entering.data() + at,
-                                  m_albedo.data() + at, textured + to, plain + to);
+                const std::size_t at = m_sublattices.tile(down, across);
+                const std::size_t to = (down * m_sublattices.tiles_across() + across) * tile_texels;
+                const TilePlanes planes{m_light[light].data() + at, m_entering.data() + at, m_albedo.data() + at,
+                                        static_cast<std::ptrdiff_t>(m_sublattices.stride())};
+                add_path_products(placed, count, scale, planes, textured + to, plain + to);
                 passed += first[count];
             }
         }

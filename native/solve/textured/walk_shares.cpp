@@ -10,18 +10,18 @@ namespace beamspread {
 
 namespace {
 
-// Weight of the light within reach of a run beside that of the run itself. Larger: light that comes from beyond has less
+// Weight of the light within reach of a run beside that of the tile itself. Larger: light that comes from beyond has less
 // noise, all other has more.
 constexpr double part_around = 0.1;
 
-// Runs of texels that follow a walk in the time in which it is drawn. Larger: shares of small planes are more alike.
-constexpr double runs_for_drawing = 40.0;
+// Tiles that follow a walk in the time in which it is drawn. Larger: shares of small planes are more alike.
+constexpr double tiles_for_drawing = 20.0;
 
 // Steps of shares in each octave. More: shares are nearer to the best ones, and more of them are others where last bits of
 // the light are, as from one host to the next.
 constexpr double share_steps = 2.0;
 
-// Time that drawing walks which few runs follow may add. Larger: less noise for each walk, and longer.
+// Time that drawing walks which few tiles follow may add. Larger: less noise for each walk, and longer.
 constexpr double max_added = 0.5;
 
 std::size_t walks_of(float share, std::size_t all)
@@ -31,15 +31,15 @@ std::size_t walks_of(float share, std::size_t all)
     return static_cast<std::size_t>(std::max(std::round(static_cast<double>(share) * static_cast<double>(all)), 1.0));
 }
 
-// Irradiance of the texels in each run, summed over all sublattices: [row, run].
-std::vector<double> power_of_runs(const View2D<const float>& light, const Sublattices& sublattices)
+// Irradiance of the texels in each tile, summed over all sublattices: [down, across].
+std::vector<double> power_of_tiles(const View2D<const float>& light, const Sublattices& sublattices)
 {
-    const std::size_t side = sublattices.side(), runs = sublattices.runs();
-    std::vector<double> powers(sublattices.rows() * runs);
-    parallel_for(sublattices.rows(), [&](std::size_t row) {
-        for (std::size_t y = row * side; y < std::min((row + 1) * side, light.height); ++y)
+    const std::size_t rows = sublattices.side() * tile_rows, columns = sublattices.side() * tile_columns;
+    std::vector<double> powers(sublattices.tile_count());
+    parallel_for(sublattices.tiles_down(), [&](std::size_t down) {
+        for (std::size_t y = down * rows; y < std::min((down + 1) * rows, light.height); ++y)
             for (std::size_t x = 0; x < light.width; ++x)
-                powers[row * runs + x / (side * texels_per_run)] += light(y, x);
+                powers[down * sublattices.tiles_across() + x / columns] += light(y, x);
     });
     return powers;
 }
@@ -59,18 +59,19 @@ std::vector<double> sums_along(const std::vector<double>& values, std::size_t st
 }  // namespace
 
 WalkShares::WalkShares(const std::vector<View2D<const float>>& lights, const Sublattices& sublattices)
-    : m_runs(sublattices.runs())
+    : m_across(sublattices.tiles_across())
 {
-    const std::size_t rows = sublattices.rows(), reach = sublattices.reach(), side = sublattices.side();
-    const std::size_t away_rows = (reach + side - 1) / side;
-    const std::size_t away_runs = (reach + side * texels_per_run - 1) / (side * texels_per_run);
-    std::vector<double> sums(rows * m_runs);
+    const std::size_t rows = sublattices.side() * tile_rows, columns = sublattices.side() * tile_columns;
+    const std::size_t away_down = (sublattices.reach() + rows - 1) / rows;
+    const std::size_t away_across = (sublattices.reach() + columns - 1) / columns;
+    std::vector<double> sums(sublattices.tile_count());
     for (const View2D<const float>& light : lights) {
-        const std::vector<double> own = power_of_runs(light, sublattices);
-        const std::vector<double> near = sums_along(sums_along(own, m_runs, rows, away_rows), 1, m_runs, away_runs);
+        const std::vector<double> own = power_of_tiles(light, sublattices);
+        const std::vector<double> near =
+            sums_along(sums_along(own, m_across, sublattices.tiles_down(), away_down), 1, m_across, away_across);
         std::vector<float>& shares = m_shares.emplace_back(own.size());
         for (std::size_t i = 0; i < own.size(); ++i) {
-            const double around = near[i] / static_cast<double>((2 * away_rows + 1) * (2 * away_runs + 1));
+            const double around = near[i] / static_cast<double>((2 * away_down + 1) * (2 * away_across + 1));
             shares[i] = static_cast<float>(own[i] + part_around * around);
             sums[i] += shares[i];
         }
@@ -88,7 +89,7 @@ void WalkShares::divide_by(const std::vector<double>& sums)
                 shares[i] /= static_cast<float>(sums[i]);
 }
 
-// Rounds the shares to steps, and makes those of each run sum up to 1 again.
+// Rounds the shares to steps, and makes those of each tile sum up to 1 again.
 void WalkShares::round()
 {
     std::vector<double> sums(m_shares.front().size());
@@ -102,7 +103,7 @@ void WalkShares::round()
     divide_by(sums);
 }
 
-// Each sublattice draws as many walks of a light as any of its runs follow: where there are few runs, most shares come
+// Each sublattice draws as many walks of a light as any of its tiles follow: where there are few tiles, most shares come
 // nearer to their means.
 void WalkShares::even_out()
 {
@@ -113,7 +114,7 @@ void WalkShares::even_out()
         means.push_back(std::accumulate(shares.begin(), shares.end(), 0.0) / static_cast<double>(shares.size()));
     }
     const double mean_drawn = std::accumulate(means.begin(), means.end(), 0.0);
-    const double allowed = max_added * static_cast<double>(m_shares.front().size()) / runs_for_drawing;
+    const double allowed = max_added * static_cast<double>(m_shares.front().size()) / tiles_for_drawing;
     if (drawn - mean_drawn <= allowed)
         return;
     const double part = allowed / (drawn - mean_drawn);
@@ -123,9 +124,9 @@ void WalkShares::even_out()
                 share = static_cast<float>(std::lerp(means[light], static_cast<double>(share), part));
 }
 
-std::size_t WalkShares::walks(std::size_t light, std::size_t row, std::size_t run, std::size_t all) const
+std::size_t WalkShares::walks(std::size_t light, std::size_t down, std::size_t across, std::size_t all) const
 {
-    return walks_of(m_shares[light][row * m_runs + run], all);
+    return walks_of(m_shares[light][down * m_across + across], all);
 }
 
 std::size_t WalkShares::most(std::size_t light, std::size_t all) const

@@ -14,19 +14,19 @@ public:
     // `lights`: the irradiance of each.
     WalkShares(const std::vector<View2D<const float>>& lights, const Sublattices& sublattices);
 
-    // Walks, of `all` in this run of texels of any sublattice, that belong to a light; 0 if none of it can get there.
-    std::size_t walks(std::size_t light, std::size_t row, std::size_t run, std::size_t all) const;
+    // Walks, of `all` in this tile of any sublattice, that belong to a light; 0 if none of it can get there.
+    std::size_t walks(std::size_t light, std::size_t down, std::size_t across, std::size_t all) const;
 
-    // The most walks of a light, of `all` in any run.
+    // The most walks of a light, of `all` in any tile.
     std::size_t most(std::size_t light, std::size_t all) const;
 
 private:
-    void divide_by(const std::vector<double>& sums);  // [row, run]
+    void divide_by(const std::vector<double>& sums);  // [down, across]
     void even_out();
     void round();
 
-    std::size_t m_runs;
-    std::vector<std::vector<float>> m_shares;  // [light][row, run]
+    std::size_t m_across;
+    std::vector<std::vector<float>> m_shares;  // [light][down, across]
 };
 
 }  // namespace beamspread
