@@ -136,11 +136,13 @@ double ReceiverRays::find_open_part(const BentTexel& texel) const
     // Most texels have no crease, which takes less time to see.
     std::array<Vec3f, border.size()> transmittance;
     m_occluders->transmit(rays, transmittance.data(), false);
-    if (std::ranges::all_of(transmittance, [](const Vec3f& part) { return part == Vec3f(1.0f); }))
-        return 1.0;
-    m_occluders->find_surfaces(rays, hits.data(), true);
+    std::size_t blocked = 0;
+    for (std::size_t k = 0; k < border.size(); ++k)
+        if (transmittance[k] != Vec3f(1.0f))
+            rays[blocked++] = rays[k];
+    m_occluders->find_surfaces(std::span(rays).first(blocked), hits.data(), true);
     float open = 1.0f;
-    for (std::size_t k = 0; k < border.size(); ++k) {
+    for (std::size_t k = 0; k < blocked; ++k) {
         const std::optional<std::size_t> triangle = hits[k].own_opaque;
         if (hits[k].is_hit && (!triangle || m_occluders->owner(*triangle) == m_grid.owner))
             open = std::min(open, static_cast<float>(glm::distance(hits[k].position, middle) / rays[k].distance));

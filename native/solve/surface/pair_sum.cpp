@@ -278,15 +278,15 @@ struct LaneSums {
     std::array<Lanes, PairTargets::most> beyond{};
 };
 
-// Adds the light of a source. `target` has positions, then normals.
-template <std::size_t most_groups, class Source>
+// Adds the light of a source. `target` has positions, then normals. `is_one_block`: all functions fit into one block.
+template <std::size_t most_groups, bool is_one_block, class Source>
 [[gnu::always_inline]] inline void add_source(const PairTables& tables, const PairTargets& targets,
                                               const std::array<Floats, 6>& target, const Source& source,
                                               const float* moments, std::size_t stride, LaneSums<most_groups>& sums)
 {
     constexpr bool is_cluster = std::is_same_v<Source, ClusterSource>;
     const std::size_t groups = is_plain ? tables.lanes.groups : most_groups;
-    const std::size_t lanes = tables.lanes.lanes();
+    const std::size_t lanes = is_one_block ? lanes_per_block : tables.lanes.lanes();
     const BlockCounts* point_blocks = tables.point->blocks.data();
     BlockCounts all_blocks;
     all_blocks.fill(static_cast<std::uint8_t>(tables.lanes.blocks));
@@ -302,6 +302,19 @@ template <std::size_t most_groups, class Source>
             find_rows(tables, source, pairs, tables.scales[g], is_cluster, rows[g]);
     const float* of_source = moments + source.moments * stride;
     const std::size_t bits = tables.lanes.harmonic_bits;
+    const Floats weights = source.area * pairs.per_square;
+    // Moments with cos and sin(m beta).
+    std::array<Lanes, 2> light_of_block;
+    const auto load_light = [&](std::size_t g, std::size_t b) __attribute__((always_inline)) {
+        const float* values = of_source + (tables.lanes.set[g] * tables.lanes.blocks + b) * 2 * lanes_per_block;
+        load(values, light_of_block[0]);
+        load(values + lanes_per_block, light_of_block[1]);
+    };
+    Lanes is_first;  // 1 where m is 1, else 0
+    if constexpr (is_one_block) {
+        load_light(0, 0);
+        load(tables.lanes.is_first.data(), is_first);
+    }
     for (std::size_t i = 0; i < targets.count; ++i) {
         if (!(pairs.chord[i] < tables.reach) || (!is_cluster && source.moments == targets.own[i]))
             continue;
@@ -316,7 +329,7 @@ template <std::size_t most_groups, class Source>
         if (blocks == 0)
             continue;
         const ChordTable& table = is_disk ? tables.disks[source.disk]->light : tables.point->light;
-        const float weight = source.area * pairs.per_square[i];
+        const float weight = weights[i];
         Harmonics8 real{};
         Harmonics8 imaginary{};
         if (bits > 1) {
@@ -338,15 +351,15 @@ template <std::size_t most_groups, class Source>
             load(high + lanes, row[1]);
             value += row[0] * rows[g].weight[2][i] + row[1] * rows[g].weight[3][i];
         };
-        for (std::size_t b = 0; b < blocks; ++b) {
+        for (std::size_t b = 0; b < (is_one_block ? 1 : blocks); ++b) {
             const std::size_t at = b * lanes_per_block;
             Lanes cosines, sines;
             if (bits > 1) {
                 spread(real, tables.lanes.harmonic.data() + at, cosines);
                 spread(imaginary, tables.lanes.harmonic.data() + at, sines);
             } else {
-                Lanes is_first;  // 1 where m is 1, else 0
-                load(tables.lanes.is_first.data() + at, is_first);
+                if constexpr (!is_one_block)
+                    load(tables.lanes.is_first.data() + at, is_first);
                 cosines = weight + is_first * (weight * (pairs.cosine[i] - 1.0f));
                 sines = is_first * (weight * pairs.sine[i]);
             }
@@ -356,15 +369,13 @@ template <std::size_t most_groups, class Source>
             for (std::size_t g = 0; g < groups; ++g) {
                 if (b >= counts[g])
                     continue;
-                if (tables.lanes.set[g] != set) {
+                if (is_one_block || tables.lanes.set[g] != set) {
                     set = tables.lanes.set[g];
-                    const float* values = of_source + (set * tables.lanes.blocks + b) * 2 * lanes_per_block;
-                    std::array<Lanes, 2> pair;
-                    load(values, pair[0]);
-                    load(values + lanes_per_block, pair[1]);
-                    light = pair[0] * cosines + pair[1] * sines;
+                    if constexpr (!is_one_block)
+                        load_light(g, b);
+                    light = light_of_block[0] * cosines + light_of_block[1] * sines;
                     if constexpr (is_cluster)
-                        turned = pair[1] * cosines - pair[0] * sines;
+                        turned = light_of_block[1] * cosines - light_of_block[0] * sines;
                 }
                 Lanes value;
                 interpolate(g, table.values[g].data() + at, value);
@@ -390,7 +401,7 @@ template <std::size_t most_groups, class Source>
     }
 }
 
-template <std::size_t most_groups>
+template <std::size_t most_groups, bool is_one_block>
 void add_pairs_of(const PairTables& tables, const PairTargets& targets, const PairSources& sources,
                   const float* moments, std::size_t stride, float* sums, float* beyond)
 {
@@ -402,9 +413,9 @@ void add_pairs_of(const PairTables& tables, const PairTargets& targets, const Pa
     LaneSums<most_groups> all;
     for (const std::span<const PairSource> samples : sources.samples)
         for (const PairSource& sample : samples)
-            add_source(tables, targets, target, sample, moments, stride, all);
+            add_source<most_groups, is_one_block>(tables, targets, target, sample, moments, stride, all);
     for (const ClusterSource* cluster : sources.clusters)
-        add_source(tables, targets, target, *cluster, moments, stride, all);
+        add_source<most_groups, is_one_block>(tables, targets, target, *cluster, moments, stride, all);
     std::array<float, lanes_per_block> values;
     for (std::size_t i = 0; i < targets.count; ++i) {
         for (std::size_t g = 0; g < tables.lanes.groups; ++g) {
@@ -422,9 +433,11 @@ void add_pairs(const PairTables& tables, const PairTargets& targets, const PairS
                std::size_t stride, float* sums, float* beyond)
 {
     static_assert(max_results == 3);
-    const auto add = is_plain || tables.lanes.groups == 3 ? add_pairs_of<3>
-                     : tables.lanes.groups == 2           ? add_pairs_of<2>
-                                                          : add_pairs_of<1>;
+    const bool is_one_block = tables.lanes.groups == 1 && tables.lanes.blocks == 1;
+    const auto add = is_plain || tables.lanes.groups == 3 ? add_pairs_of<3, false>
+                     : tables.lanes.groups == 2           ? add_pairs_of<2, false>
+                     : is_one_block                       ? add_pairs_of<1, true>
+                                                          : add_pairs_of<1, false>;
     add(tables, targets, sources, moments, stride, sums, beyond);
 }
 

@@ -403,9 +403,11 @@ bool SurfaceTree::is_far(const Node& node, float distance, const Vec3f& normal, 
     if (opening.bound.empty() || step < opening.first)
         return false;
     const std::size_t row = std::min<std::size_t>(step - opening.first, opening.bound.size() - 1);
-    const float turned = turn_of_edge(node.normal - normal, node.variance, node.spread, square);
-    const float error = (fourth_weight * size / square + edge_weight * turned) * size;
-    return error * node.weight * opening.bound[row] <= 1.0f;
+    const float of_size = fourth_weight * size / square;
+    const auto is_small = [&](float error) { return error * size * node.weight * opening.bound[row] <= 1.0f; };
+    // Most clusters that are too large are so without a turn, which takes longer to find.
+    return is_small(of_size) &&
+           is_small(of_size + edge_weight * turn_of_edge(node.normal - normal, node.variance, node.spread, square));
 }
 
 void SurfaceTree::find_candidates(std::size_t begin, std::size_t end, const Opening& opening, float reach,
