@@ -201,9 +201,15 @@ def light_below_a_pane(material):
     return state.announced[name].around
 
 
-def test_light_of_lamps_through_glass_is_found_by_paths_that_meet_them():
-    """The sun fills a part of a path's directions: its form factor, the squared sine of half its angle."""
+@pytest.mark.parametrize("has_others", [False, True])
+def test_light_of_lamps_through_glass_is_found_by_paths_that_meet_them(has_others):
+    """The sun fills a part of a path's directions: its form factor, the squared sine of half its angle.
+
+    Nodes that lead to no output count for nothing.
+    """
     nodes = Nodes(bpy.data.materials.new("Glass"), clear=True)
+    if has_others:
+        nodes.add("BsdfPrincipled")
     around = light_below_a_pane(nodes.finish(nodes.add("BsdfGlass", {})))
     met = 0.05**2
     assert (around.lit, around.returned[0]) == (0, 1)

@@ -24,7 +24,7 @@ from ..node.draw import bent_materials
 from ..node.find import BakeTarget, targets_of
 from ..read.lamps import fault, is_portal, read_lamp
 from ..read.lights import lights_surfaces
-from ..read.node_kinds import NodeKinds, all_known, kinds_of
+from ..read.node_kinds import NodeKinds, all_known, closures_of, kinds_of
 from ..read.scene_cache import scene_cache
 from ..read.visibility import SURFACE_TYPES, by_name, placed, render_visible_names
 from .rays import CLEAR, Look, Tracer, places_for
@@ -229,7 +229,7 @@ def _look(material) -> Look:
         return Look(float(np.clip(material.diffuse_color[:3], 0.0, 1.0).mean()))
     kinds = _kinds(material)
     glow = 0.0 if not kinds.glows else GLOW if kinds.color is None else np.pi * float(np.mean(kinds.color))
-    closures = [node for node in material.node_tree.nodes if "Bsdf" in node.bl_idname]
+    closures = closures_of(material)
     sockets = [node.inputs.get("Base Color") or node.inputs.get("Color") for node in closures]
     plain = [float(np.mean(item.default_value[:3])) for item in sockets if item is not None and not item.is_linked]
     is_plain = plain and len(plain) == len(sockets)

@@ -62,6 +62,13 @@ def kinds_of(owner) -> NodeKinds:
     return NodeKinds(bool(glowing), color, is_known, asks_path)
 
 
+def closures_of(material) -> list:
+    """The nodes before the surface of a material with nodes that reflect light, or let it through."""
+    surface = surface_of(material.node_tree)
+    nodes = [] if surface is None else [source.node for source in _sources(surface)]
+    return [node for node in nodes if "Bsdf" in node.bl_idname]
+
+
 def all_known(wanted: InputSocket) -> bool:
     """True if our own readers know all nodes before an input."""
     return all(map(_is_known, _sources(wanted)))
