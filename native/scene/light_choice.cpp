@@ -33,14 +33,15 @@ float mean(const Vec3f& color)
     return (color.x + color.y + color.z) / 3.0f;
 }
 
+// Where rays start: the triangle on which the point lies, and its own light, are behind.
+Vec3 start_of(const ShadingPoint& point)
+{
+    return point.position + point.normal * point.rounding;
+}
+
 ShadowRay shadow_ray(const ShadingPoint& point, const LightRay& ray)
 {
-    const Vec3 lift = point.normal * point.rounding;
-    if (std::isinf(ray.distance))
-        return {.origin = point.position + lift, .direction = -ray.travel, .distance = ray.distance};
-    const Vec3 way = -ray.travel * ray.distance - lift;
-    const double length = glm::length(way);
-    return {.origin = point.position + lift, .direction = way / length, .distance = length - point.rounding};
+    return {.origin = start_of(point), .direction = -ray.travel, .distance = ray.distance - point.rounding};
 }
 
 }  // namespace
@@ -139,7 +140,8 @@ LightChoice::Candidate LightChoice::candidate(std::size_t light, const ShadingPo
         place.y = random.uniform();
     }
     LightRay ray;
-    m_lights[light].light->sample({&point.position, 1}, point.normal, {&place, 1}, &ray);
+    const Vec3 start = start_of(point);
+    m_lights[light].light->sample({&start, 1}, point.normal, {&place, 1}, &ray);
     return with_radiance(light, point, ray);
 }
 

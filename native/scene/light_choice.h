@@ -57,7 +57,7 @@ public:
 
 private:
     struct Candidate {
-        LightRay ray;
+        LightRay ray{};
         Vec3f radiance{0.0f};  // that it brings to the viewer
         float glow = 0.0f;     // flux of the ray, mean of the channels
         std::size_t light = 0;

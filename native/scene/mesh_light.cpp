@@ -169,9 +169,28 @@ std::shared_ptr<const Light> MeshLight::facing_all() const
 {
     std::shared_ptr<MeshLight> light = without_faces();
     light->m_faces = m_faces;
-    light->m_cumulated = m_cumulated;
-    light->m_by_solid_angle = true;
+    std::vector<FaceBox> boxes;
+    for (std::size_t i = 0; i < m_faces.size(); ++i) {
+        const auto& [a, b, c] = m_faces[i].corners;
+        const double power = m_cumulated[i + 1] - m_cumulated[i];
+        boxes.push_back({glm::min(glm::min(a, b), c), glm::max(glm::max(a, b), c), power});
+    }
+    light->m_tree = FaceTree(boxes);
     return light;
+}
+
+FaceTree::Choice MeshLight::choose(const Vec3& point, const Vec3& normal, double number) const
+{
+    if (!m_tree.is_empty())
+        return m_tree.choose(point, normal, number);
+    const double total = m_cumulated.back();
+    const double wanted = number * total;
+    const auto above = std::upper_bound(m_cumulated.begin() + 1, m_cumulated.end() - 1, wanted);
+    const auto index = static_cast<std::size_t>(above - m_cumulated.begin()) - 1;
+    const double weight = m_cumulated[index + 1] - m_cumulated[index];
+    return {.face = index,
+            .probability = weight / total,
+            .rest = std::clamp((wanted - m_cumulated[index]) / weight, 0.0, 1.0)};
 }
 
 LightRay MeshLight::near_ray(const Vec3& point, const Face& face, const Vec2& place, double probability)
@@ -199,31 +218,26 @@ void MeshLight::sample(std::span<const Vec3> points, const Vec3& normal, std::sp
         std::fill_n(rays, points.size(), LightRay{.travel = -normal, .distance = 1.0, .flux = Vec3f(0.0f)});
         return;
     }
-    const double total = m_cumulated.back();
     for (std::size_t i = 0; i < points.size(); ++i) {
-        const Vec2& place = square[i];
-        const double wanted = place.x * total;
-        const auto above = std::upper_bound(m_cumulated.begin() + 1, m_cumulated.end() - 1, wanted);
-        const auto index = static_cast<std::size_t>(above - m_cumulated.begin()) - 1;
-        const double power = m_cumulated[index + 1] - m_cumulated[index];
-        const Face& face = m_faces[index];
-        const double part = std::clamp((wanted - m_cumulated[index]) / power, 0.0, 1.0);
-        if (shows_fronts_alone(points[i]) && shows_back(face, points[i])) {
+        const FaceTree::Choice chosen = choose(points[i], normal, square[i].x);
+        const Face& face = m_faces[chosen.face];
+        if (!(chosen.probability > 0.0) || (shows_fronts_alone(points[i]) && shows_back(face, points[i]))) {
             rays[i] = {.travel = -normal, .distance = 1.0, .flux = Vec3f(0.0f)};
             continue;
         }
+        const Vec2 place(chosen.rest, square[i].y);
         const Vec3 to_middle = middle(face) - points[i];
-        if (m_by_solid_angle && glm::dot(to_middle, to_middle) < near_in_squared_sizes * face.squared_size) {
-            rays[i] = near_ray(points[i], face, {part, place.y}, power / total);
+        if (!m_tree.is_empty() && glm::dot(to_middle, to_middle) < near_in_squared_sizes * face.squared_size) {
+            rays[i] = near_ray(points[i], face, place, chosen.probability);
             continue;
         }
-        const double root = std::sqrt(part);
+        const double root = std::sqrt(place.x);
         const auto& [a, b, c] = face.corners;
         const Vec3 way = a + root * ((b - a) + place.y * (c - b)) - points[i];
         const double squared = glm::dot(way, way);
         const double distance = std::sqrt(squared);
         // Area times cosine at the light, over the probability of the face.
-        const double projected = 0.5 * std::abs(glm::dot(face.normal, way)) / distance * total / power;
+        const double projected = 0.5 * std::abs(glm::dot(face.normal, way)) / distance / chosen.probability;
         rays[i] = {.travel = -way / distance,
                    .distance = distance * short_of_face,
                    .flux = Vec3f(face.radiance * (projected / squared))};

@@ -5,6 +5,7 @@
 #include <memory>
 #include <vector>
 
+#include "scene/face_tree.h"
 #include "scene/light.h"
 #include "scene/occluder_mesh.h"
 
@@ -25,7 +26,8 @@ public:
     bool is_colored() const override { return m_is_colored; }
     // A copy without the faces that the rectangle can't see, whose rays go to the others by the irradiance that they bring.
     std::shared_ptr<const Light> facing(const Vec3& normal, std::span<const Vec3> points) const override;
-    // A copy whose near faces are sampled by solid angle, so that rays from points beside them have bounded flux.
+    // A copy whose rays go to faces by their distance, and are spread over near ones by solid angle, so that those from
+    // points beside them have bounded flux.
     std::shared_ptr<const Light> facing_all() const override;
 
 private:
@@ -47,6 +49,8 @@ private:
     {
         return glm::dot(face.normal, face.corners[0] - point) >= 0.0;
     }
+    // A face for a ray from a point of a surface with that normal.
+    FaceTree::Choice choose(const Vec3& point, const Vec3& normal, double number) const;
     // A ray to a near face, evenly over its solid angle; `probability` is that of the face.
     static LightRay near_ray(const Vec3& point, const Face& face, const Vec2& place, double probability);
 
@@ -55,9 +59,9 @@ private:
     std::vector<Face> m_faces;
     // Sums of the faces' weights, by which rays choose them; one more than faces. At first their power.
     std::vector<double> m_cumulated;
+    FaceTree m_tree;  // by which rays choose faces instead; empty but in copies for all points
     bool m_is_colored = false;
     bool m_is_closed = false;
-    bool m_by_solid_angle = false;
 };
 
 }  // namespace beamspread

@@ -220,6 +220,8 @@ CHANGES = {
     "color without bounced light": (colored_veil, ""),
     "transmittance painted": (lambda: paint("Holes"), "textures"),
     "transmittance of another node": (lambda: link("Veil", "ShaderNodeValue", input_of("Veil", "Alpha")), "other"),
+    "wall unseen, without bounced light": (data("objects", "Wall", "visible_diffuse", False), ""),
+    "glow unseen": (data("objects", "Bulb", "visible_diffuse", False), "other objects"),
     "emission in a group": (group_value, "other objects"),
     "node without links": (lambda: bpy.data.materials["Glow"].node_tree.nodes.new("ShaderNodeTexNoise"), ""),
     "world": (
@@ -377,11 +379,14 @@ def test_members_of_collections_of_light_linking(plane, is_excluded):
     assert "lights" in row().messages[0].text
 
 
-def test_all_of_a_material_counts_where_light_bounces_from_it(plane):
+def test_all_of_a_material_counts_where_light_bounces_from_it_and_whether_rays_see_it(plane):
     bpy.context.scene.beamspread.use_indirect = True
     keep_present_digests()
     colored_veil()
     assert row().messages[0].text == "Changed since its bake: 'Screen'."
+    keep_present_digests()
+    bpy.data.objects["Wall"].visible_diffuse = False
+    assert row().messages[0].text == "Changed since its bake: 'Wall'."
     keep_present_digests()
     scenes.node_of(scenes.add_plane("Tile", material=scenes.add_material("Second")).data.materials[0]).ior = 1.2
     keep_present_digests()

@@ -119,6 +119,24 @@ def test_lights_share_the_shadows_of_their_blockers():
     assert scene.caster(square(), SUN) is scene.caster(square(), linked("Roof", "Others"))
 
 
+def test_light_bounces_from_meshes_without_shadows_and_passes_unseen_ones():
+    meshes = [Occluder("Flame", ROOF, casts_shadows=False), Occluder("Flag", ROOF, is_seen=False)]
+    more = Mesh(ROOF.vertices, np.concatenate([ROOF.triangles] * 2))
+    scene = Illumination([SUN], [*meshes, Occluder("Wall", more)])
+    assert (scene.caster(square()).triangle_count, scene.reflecting(square()).triangle_count) == (3, 3)
+    assert scene.triangle_count == 3
+    shadowless, unseen = (Illumination([SUN], [mesh]) for mesh in meshes)
+    assert shadowless.caster(square()) is None
+    assert shadowless.reflecting(square()).triangle_count == 1
+    assert unseen.reflecting(square()) is None
+    assert unseen.caster(square()).triangle_count == 1
+    plain = Illumination([SUN], more)
+    assert plain.caster(square()) is plain.reflecting(square())
+    assert (
+        len({scene.shadow_key() for scene in (shadowless, unseen, Illumination([SUN], [Occluder("Flame", ROOF)]))}) == 3
+    )
+
+
 def test_placements_of_one_mesh_stand_in_one_caster():
     up, aside = np.eye(4)[:3], np.eye(4)[:3]
     up[2, 3], aside[0, 3] = 1, 30

@@ -339,6 +339,42 @@ def test_a_glowing_panel_close_to_a_wall():
     assert found[0]["paths"] < 3 * found[1]["paths"]
 
 
+def test_rays_from_a_wall_go_to_the_near_ones_of_many_glowing_faces():
+    """A panel of 2048 faces has 4 times the noise of its two triangles, and 9 times if all faces are drawn alike."""
+    room = native.Occluders([mesh(*box((-1, -1, -1e-3), (1, 1, 1)), grey(0.7))])
+    turned = np.array([(0, 1, 0), (0, 0, 1), (1, 0, 0)])  # z along +x
+    ticks = np.linspace(-1, 1, 33)
+    places = np.stack(np.meshgrid(ticks, ticks), -1).reshape(-1, 2)
+    first = (np.arange(32)[:, None] * 33 + np.arange(32)).reshape(-1, 1)
+    faces = np.concatenate([first + (0, 1, 34), first + (0, 34, 33)]).astype(np.uint32)
+    below = [grid((-0.2, 0, 1e-3), (1.4, 1.4))]
+    found = []
+    for corners, triangles in ((SQUARE, FACES), (np.pad(places, ((0, 0), (0, 1))), faces)):
+        corners = np.ascontiguousarray(corners @ turned * 0.3 + (0.99, 0, 0.5))
+        panel = native.MeshLight(corners, triangles, np.ones((len(triangles), 3), np.float32))
+        options = {"direct": 0.0, "tolerance": 1e-9, "max_bounces": 4, "max_samples": 64}
+        found.append(bounced(room, [(panel, 1.0)], below, **options))
+    few, many = found
+    error = 3 * np.hypot(few["noise"], many["noise"]) * few["irradiance"]
+    assert many["irradiance"] == pytest.approx(few["irradiance"], abs=error)
+    assert many["noise"] < 6 * few["noise"]
+
+
+@pytest.mark.parametrize("offset", [(0, 0, 0), (3000.0, -2000.0, 500.0)])
+@pytest.mark.parametrize("casts_shadows", [True, False])
+def test_a_face_lights_not_itself(casts_shadows, offset):
+    """No point of a ball sees another, and none has light of the face on which it lies."""
+    vertices, triangles = sphere(8)[:2]
+    vertices = np.ascontiguousarray(0.3 * vertices + (0, 0, 0.6) + offset)
+    scene = native.Occluders([mesh(vertices, triangles, grey(0.8))], offset)
+    ball = native.MeshLight(vertices, triangles, np.ones((len(triangles), 3), np.float32))
+    below = [grid(np.array((0, 0, 1e-3)) + offset)]
+    options = {"direct": 1.0, "max_bounces": 4, "max_samples": 64}
+    found = native.bounced_light(below, STRATA, [(ball, UNIT, scene if casts_shadows else None)], scene, **options)
+    assert found["paths"] > 0
+    assert found["irradiance"] == 0
+
+
 def test_a_budget_of_rays_ends_the_search():
     """At a tolerance that is out of reach, with the same bits for any number of threads."""
     scene = native.Occluders([mesh(*sphere(12)[:2], grey(0.7))])

@@ -22,8 +22,8 @@ from ...core.time_left import duration
 from .. import compat
 from ..node.draw import bent_materials
 from ..node.find import BakeTarget, targets_of
+from ..read.geometry import lights_surfaces
 from ..read.lamps import fault, is_portal, read_lamp
-from ..read.lights import lights_surfaces
 from ..read.node_kinds import NodeKinds, all_known, closures_of, kinds_of
 from ..read.scene_cache import scene_cache
 from ..read.visibility import SURFACE_TYPES, by_name, placed, render_visible_names
@@ -138,9 +138,7 @@ class _SceneFacts:
         self._boxes.append((matrix[:3, :3] @ (low + high) / 2 + matrix[:3, 3], matrix[:3, :3] * (high - low) / 2))
         kinds = [_kinds(slot.material.original) for slot in obj.material_slots if slot.material is not None]
         self._glowing += any(kind.glows for kind in kinds)
-        reflects = not kinds or any(kind.color is None for kind in kinds)
-        is_seen = obj.visible_diffuse and obj.visible_shadow
-        self.is_traceable &= all(kind.is_known for kind in kinds) and (is_seen or not reflects)
+        self.is_traceable &= all(kind.is_known for kind in kinds)
 
     def _add_world(self, world, view_layer) -> None:
         is_lit = world is not None and view_layer.use_sky and world.cycles_visibility.diffuse

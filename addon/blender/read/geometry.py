@@ -76,13 +76,14 @@ class OccluderReader:
         self._cache, self._medium_of, self._min_roughness = cache, medium_of, min_roughness
         self.untraceable = ""
         self._meshes: dict[tuple, Mesh | None] = {}
-        self._matrices: dict[tuple, list] = {}  # of the instances, by object name and key of the mesh
+        self._matrices: dict[tuple, list] = {}  # of the instances, by name, key of the mesh and rays that meet it
         self.messages: list[Message] = []
 
     def add(self, instance) -> None:
-        """Add an entry of `depsgraph.object_instances` that renders, of any type, if it casts shadows."""
-        obj = instance.object
-        if obj.type not in GEOMETRY_TYPES or not casts_shadows(obj, instance.parent if instance.is_instance else None):
+        """Add an entry of `depsgraph.object_instances` that renders, of any type, if rays meet it."""
+        obj, instancer = instance.object, instance.parent if instance.is_instance else None
+        meets = casts_shadows(obj, instancer), self._medium_of is not None and lights_surfaces(obj, instancer)
+        if obj.type not in GEOMETRY_TYPES or not any(meets):
             return
         key = mesh_key(obj)
         if key not in self._meshes:
@@ -93,7 +94,7 @@ class OccluderReader:
         if mesh.lost:
             self.messages.append(lost_triangles(obj.name, mesh.lost))
         if is_within(matrix, mesh.reach):
-            self._matrices.setdefault((obj.name, key), []).append(matrix[:3])
+            self._matrices.setdefault((obj.name, key, meets), []).append(matrix[:3])
         else:
             self.messages.append(lost_instance(obj.name))
 
@@ -106,11 +107,6 @@ class OccluderReader:
         )
         return self._cache.get(("mesh", *key), shapes_of(instance), lambda: local_mesh(obj, slots), state=state)
 
-    def reflects(self, obj) -> bool:
-        """True if an evaluated object returns light; False if reflections are not read."""
-        slots = [self._slot(slot.material) for slot in obj.material_slots] or [self._slot(None)]
-        return any(slot.reflection is not None and slot.reflection.reflector is not None for slot in slots)
-
     def _slot(self, material) -> Slot:
         transmittance = transmittance_of(material, self._cache)
         if self._medium_of is None:
@@ -122,8 +118,8 @@ class OccluderReader:
 
     def occluders(self) -> list[Occluder]:
         return [
-            Occluder(name, self._meshes[key], np.array(matrices, float).reshape(-1, 3, 4))
-            for (name, key), matrices in self._matrices.items()
+            Occluder(name, self._meshes[key], np.array(matrices, float).reshape(-1, 3, 4), *meets)
+            for (name, key, meets), matrices in self._matrices.items()
         ]
 
 
@@ -142,6 +138,12 @@ def lost_instance(name: str) -> Message:
 def casts_shadows(obj, instancer) -> bool:
     """True if an object casts shadows; `instancer` is the object that instances it, or None."""
     return all(getattr(owner, "visible_shadow", True) for owner in (obj, instancer) if owner is not None)
+
+
+def lights_surfaces(obj, instancer) -> bool:
+    """True if the light of an object falls on surfaces; `instancer` is the object that instances it, or None."""
+    asks_instancer = instancer is not None and (obj.type != "LIGHT" or compat.instancer_hides_lamps())
+    return obj.visible_diffuse and (not asks_instancer or instancer.visible_diffuse)
 
 
 def mesh_key(obj) -> tuple:

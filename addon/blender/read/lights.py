@@ -14,7 +14,15 @@ from ...core.scene.illumination import Illumination
 from ...core.scene.lights import Light
 from .. import compat
 from .emitters import VARYING, EmissiveMesh, radiance_of
-from .geometry import GEOMETRY_TYPES, OccluderReader, casts_shadows, lost_instance, lost_triangles, shapes_of
+from .geometry import (
+    GEOMETRY_TYPES,
+    OccluderReader,
+    casts_shadows,
+    lights_surfaces,
+    lost_instance,
+    lost_triangles,
+    shapes_of,
+)
 from .image_nodes import missing_images
 from .lamps import fault, is_portal, read_lamp
 from .nodes import InputSocket, Links, surface_of
@@ -50,26 +58,21 @@ def _read(depsgraph, cache: SceneCache, medium_of: MediumOf | None) -> Illuminat
         _Lights(depsgraph, cache),
         OccluderReader(cache, medium_of, compat.filtered_roughness(depsgraph.scene)),
     )
-    hidden: list[str] = []
     for instance in depsgraph.object_instances:
         if not renders(instance, visible):
             continue
         obj, instancer = instance.object, instance.parent if instance.is_instance else None
         lights.warn_of_solid(left_out(obj))
-        is_solid = obj.type in GEOMETRY_TYPES
-        is_hidden = is_solid and not (lights_surfaces(obj, instancer) and casts_shadows(obj, instancer))
-        if is_hidden and occluders.reflects(obj):
-            hidden.append(f"'{obj.name}' is hidden from some kinds of light rays.")
         if lights_surfaces(obj, instancer):
             if obj.type == "LIGHT":
                 lights.add_lamp(obj, instance.matrix_world)
-            elif is_solid:
+            elif obj.type in GEOMETRY_TYPES:
                 lights.add_mesh(instance)
         occluders.add(instance)
     world = compat.world_of(depsgraph)
     lights.add_world(depsgraph.view_layer, world)
     lights.warn_of_solid(left_out_of_world(world))
-    reasons = [lights.untraceable, occluders.untraceable, *hidden, "" if medium_of else UNREAD]
+    reasons = [lights.untraceable, occluders.untraceable, "" if medium_of else UNREAD]
     return Illumination(
         lights.all(),
         occluders.occluders(),
@@ -82,12 +85,6 @@ def _read(depsgraph, cache: SceneCache, medium_of: MediumOf | None) -> Illuminat
 
 
 UNREAD = "Reflections were not read."
-
-
-def lights_surfaces(obj, instancer) -> bool:
-    """True if the light of an object falls on surfaces; `instancer` is the object that instances it, or None."""
-    asks_instancer = instancer is not None and (obj.type != "LIGHT" or compat.instancer_hides_lamps())
-    return obj.visible_diffuse and (not asks_instancer or instancer.visible_diffuse)
 
 
 def with_lamps(depsgraph, illumination: Illumination, names: Collection[str]) -> Illumination | None:

@@ -85,9 +85,9 @@ class BouncedLight(Step):
     def run(self, job: BakeJob, progress: Progress) -> BakeJob:
         receiver, illumination, settings = job.receiver, job.illumination, job.settings
         grid = receiver.charts[0].grid
-        surfaces = illumination.caster(grid)
+        surfaces, casters = illumination.reflecting(grid), illumination.caster(grid)
         lights = [
-            (light.at(grid), light.rgb().tolist(), surfaces if light.cast_shadow else None)
+            (light.at(grid), light.rgb().tolist(), casters if light.cast_shadow else None)
             for light in illumination.lights
         ]
         grids = job.lit_grids

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Collection, Iterable, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from copy import copy
 
 import numpy as np
@@ -47,7 +47,7 @@ class Illumination:
         self._messages = (*messages, *suns)
         self._occluders = (Occluder("", occluders),) if isinstance(occluders, Mesh) else tuple(occluders or ())
         self._max_crossings = max_crossings
-        # Native occluders by origin and names of blockers; all have the same origin.
+        # Native occluders by origin and numbers of theirs; all have the same origin.
         self._casters: dict = {}
 
     def __getstate__(self) -> dict:
@@ -142,7 +142,7 @@ class Illumination:
         """A key that is equal for the same meshes with the same placements."""
         return tuple(
             (
-                occluder.name,
+                (occluder.name, occluder.casts_shadows, occluder.is_seen),
                 occluder.mesh.content,
                 tuple(map(id, (*occluder.mesh.transmittances, *occluder.mesh.reflectors))),
                 None if occluder.placements is None else occluder.placements.tobytes(),
@@ -152,10 +152,11 @@ class Illumination:
 
     @property
     def triangle_count(self) -> int:
-        """Number of triangles of all occluders, with those of each instance."""
+        """Number of triangles of all occluders that cast shadows, with those of each instance."""
         return sum(
             len(occluder.mesh.triangles) * (1 if occluder.placements is None else len(occluder.placements))
             for occluder in self._occluders
+            if occluder.casts_shadows
         )
 
     @staticmethod
@@ -169,15 +170,21 @@ class Illumination:
         The origin follows from the receiver alone, so that a bake does not depend on earlier ones. Cached occluders
         serve all receivers with the same origin, and all lights with the same blockers.
         """
+        blockers = light.blockers if light else None
+        return self._built(grid, lambda item: item.casts_shadows and (blockers is None or item.name in blockers))
+
+    def reflecting(self, grid: AnyGrid):
+        """The same of the meshes that light bounces from."""
+        return self._built(grid, lambda item: item.is_seen)
+
+    def _built(self, grid: AnyGrid, is_chosen: Callable[[Occluder], bool]):
         origin = self._origin(grid)
         if any(cached_origin != origin for cached_origin, _ in list(self._casters)):
             self._casters.clear()  # first, because each may take gigabytes
-        blockers = light.blockers if light else None
-        names = {occluder.name for occluder in self._occluders}
-        chosen = None if blockers is None or names <= blockers else frozenset(names & blockers)
+        chosen = tuple(number for number, item in enumerate(self._occluders) if is_chosen(item))
         caster = self._casters.get((origin, chosen))
         if caster is None:
-            occluders = [occluder for occluder in self._occluders if chosen is None or occluder.name in chosen]
+            occluders = [self._occluders[number] for number in chosen]
             caster = self._casters[origin, chosen] = build(occluders, origin, self._max_crossings)
         return caster
 

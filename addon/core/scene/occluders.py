@@ -1,4 +1,4 @@
-"""Meshes that cast shadows, their instances, and the light that they let through."""
+"""Meshes that cast shadows or reflect light, their instances, and the light that they let through."""
 
 from __future__ import annotations
 
@@ -99,11 +99,15 @@ class Occluder:
     name : name of the object, for lights that only some objects block.
     mesh : its mesh, which several occluders may share.
     placements : float64 (K, 3, 4), matrices from the mesh's frame to the world; None: the mesh is in the world.
+    casts_shadows : True if it blocks light on its way from a lamp.
+    is_seen : True if light bounces from it.
     """
 
     name: str
     mesh: Mesh
     placements: np.ndarray | None = None
+    casts_shadows: bool = True
+    is_seen: bool = True
 
 
 def build(occluders: Sequence[Occluder], origin: Vector, max_crossings: int | None):

@@ -16,8 +16,9 @@ from ... import compat
 from ...node.find import find_node_in_groups
 from ...read.digests import TreeDigest, digest, digest_of_mesh, values_of
 from ...read.emitters import VARYING, radiance_of
+from ...read.geometry import casts_shadows, lights_surfaces
 from ...read.lamps import is_portal, read_lamp
-from ...read.lights import lights_surfaces, links_of
+from ...read.lights import links_of
 from ...read.scene_cache import scene_cache
 from ...read.transparency import transmittance_of
 from ...read.visibility import SOLID_TYPES, SURFACE_TYPES, placed, render_visible_names, renders
@@ -109,10 +110,12 @@ class ObjectDigests:
         if obj.type == "LIGHT" and is_lit and not is_portal(obj.data):
             self.lamps += self._lamp(obj, matrix)
         elif obj.type in (SOLID_TYPES if self._bounces else SURFACE_TYPES) and not _is_faceless(obj.original):
-            casts = all(owner.visible_shadow for owner in (obj, instancer) if owner is not None)
+            casts = casts_shadows(obj, instancer)
             looks = self._looks(_shown_materials(obj))
-            links = self._links(obj) if is_lit and any(text for _, text in looks) else []
-            number = _number(self._shape(obj), _rows(matrix), casts, links)
+            glows = any(text for _, text in looks)
+            links = self._links(obj) if is_lit and glows else []
+            unseen = [] if is_lit or not (glows or self._bounces) else ["unseen"]
+            number = _number(self._shape(obj), _rows(matrix), casts, links, *unseen)
             self._instances[obj.name].append(_Instance(number, looks))
 
     def _lamp(self, obj, matrix: Matrix) -> int:
