@@ -81,11 +81,12 @@ def bent_part(polygons: Polygons) -> BentPart:
 def _outward(polygons: Polygons, corners: np.ndarray, owners: np.ndarray) -> Polygons:
     """Triangles of polygons, which `owners` names, anticlockwise seen from outside."""
     a, b, c = (polygons.corners[places] for places in corners.T)
-    is_turned = np.einsum("ij,ij->i", np.cross(b - a, c - a), polygons.area_vectors[owners]) < 0
+    area_vectors = 0.5 * np.cross(b - a, c - a)
+    is_turned = np.einsum("ij,ij->i", area_vectors, polygons.area_vectors[owners]) < 0
     corners = np.where(is_turned[:, None], corners[:, ::-1], corners).ravel()
     numbers = owners if polygons.numbers is None else polygons.numbers[owners]
     shading = None if polygons.corner_normals is None else polygons.corner_normals[corners]
-    return Polygons(
+    triangles = Polygons(
         polygons.corners[corners],
         polygons.uvs[corners],
         3 * np.arange(len(owners) + 1),
@@ -94,6 +95,8 @@ def _outward(polygons: Polygons, corners: np.ndarray, owners: np.ndarray) -> Pol
         numbers,
         corner_normals=shading,
     )
+    triangles.__dict__["area_vectors"] = np.where(is_turned[:, None], -area_vectors, area_vectors)  # known already
+    return triangles
 
 
 def facing_outward(

@@ -6,6 +6,8 @@
 #include <cmath>
 #include <limits>
 #include <numeric>
+#include <tuple>
+#include <utility>
 
 #include "base/constants.h"
 #include "base/threads.h"
@@ -133,63 +135,76 @@ SurfaceTree::SurfaceTree(std::span<const SurfaceSample> samples)
     : m_samples(samples), m_order(samples.size()), m_weights(samples.size()), m_disks(samples.size())
 {
     const std::vector<std::uint64_t> codes = codes_of(samples);
-    std::iota(m_order.begin(), m_order.end(), 0u);
-    std::sort(m_order.begin(), m_order.end(),
-              [&](std::uint32_t a, std::uint32_t b) { return codes[a] != codes[b] ? codes[a] < codes[b] : a < b; });
-    for (const std::uint32_t sample : m_order)
-        m_codes.push_back(codes[sample]);
+    std::vector<std::pair<std::uint64_t, std::uint32_t>> order;
+    for (std::size_t i = 0; i < samples.size(); ++i)
+        order.emplace_back(codes[i], static_cast<std::uint32_t>(i));
+    std::sort(order.begin(), order.end());
+    m_codes.resize(samples.size());
+    for (std::size_t i = 0; i < samples.size(); ++i)
+        std::tie(m_codes[i], m_order[i]) = order[i];
     build(0, samples.size(), false);
     m_codes = {};
 }
 
-std::uint32_t SurfaceTree::build(std::size_t begin, std::size_t end, bool is_in_leaf)
+SurfaceTree::Box SurfaceTree::box_of(std::size_t begin, std::size_t end) const
+{
+    Box box;
+    for (std::size_t i = begin; i < end; ++i) {
+        box.low = glm::min(box.low, m_samples[m_order[i]].position);
+        box.high = glm::max(box.high, m_samples[m_order[i]].position);
+    }
+    return box;
+}
+
+SurfaceTree::Box SurfaceTree::build(std::size_t begin, std::size_t end, bool is_in_leaf)
 {
     const auto number = static_cast<std::uint32_t>(m_nodes.size());
-    Node node;
-    node.begin = static_cast<std::uint32_t>(begin);
-    node.end = static_cast<std::uint32_t>(end);
-    Vec3f low(std::numeric_limits<float>::infinity());
-    Vec3f high = -low;
-    for (std::size_t i = begin; i < end; ++i) {
-        low = glm::min(low, m_samples[m_order[i]].position);
-        high = glm::max(high, m_samples[m_order[i]].position);
-    }
-    node.middle = 0.5f * (low + high);
-    node.radius = 0.5f * glm::length(high - low);
-    m_nodes.push_back(node);
+    m_nodes.push_back({.begin = static_cast<std::uint32_t>(begin), .end = static_cast<std::uint32_t>(end)});
     if (end - begin <= leaf_size && !is_in_leaf)
         m_leaves.push_back(number);
-    if (end - begin <= tip_size)
-        return number;
-    if (end - begin <= parted_size) {
-        const Vec3f size = high - low;
-        const int axis = size.x >= size.y && size.x >= size.z ? 0 : size.y >= size.z ? 1 : 2;
-        const std::size_t part = end - begin <= leaf_size ? tip_size : leaf_size;
-        const std::size_t middle = begin + (end - begin + part - 1) / part / 2 * part;
-        const auto at = [&](std::size_t i) { return m_order.begin() + static_cast<std::ptrdiff_t>(i); };
-        std::nth_element(at(begin), at(middle), at(end), [&](std::uint32_t a, std::uint32_t b) {
-            const float first = m_samples[a].position[axis];
-            const float second = m_samples[b].position[axis];
-            return first != second ? first < second : a < b;
-        });
-        build(begin, middle, end - begin <= leaf_size);
-        m_nodes[number].second = build(middle, end, end - begin <= leaf_size);
-        return number;
+    const bool is_parted = end - begin <= parted_size;  // else the boxes of its parts tell its own
+    Box box = is_parted ? box_of(begin, end) : Box{};
+    if (end - begin > tip_size) {
+        const std::size_t middle = is_parted ? part_by_place(begin, end, box) : part_by_code(begin, end);
+        const bool are_in_leaf = end - begin <= leaf_size;
+        const Box first = build(begin, middle, are_in_leaf);
+        m_nodes[number].second = static_cast<std::uint32_t>(m_nodes.size());
+        const Box second = build(middle, end, are_in_leaf);
+        if (!is_parted)
+            box = {glm::min(first.low, second.low), glm::max(first.high, second.high)};
     }
-    // Part the samples where the first bit changes in which their codes differ; equal codes in the middle.
+    m_nodes[number].middle = 0.5f * (box.low + box.high);
+    m_nodes[number].radius = 0.5f * glm::length(box.high - box.low);
+    return box;
+}
+
+// Parts samples at the middle of the longest side of their box, to whole leaves. Returns the first of the second part.
+std::size_t SurfaceTree::part_by_place(std::size_t begin, std::size_t end, const Box& box)
+{
+    const Vec3f size = box.high - box.low;
+    const int axis = size.x >= size.y && size.x >= size.z ? 0 : size.y >= size.z ? 1 : 2;
+    const std::size_t part = end - begin <= leaf_size ? tip_size : leaf_size;
+    const std::size_t middle = begin + (end - begin + part - 1) / part / 2 * part;
+    const auto at = [&](std::size_t i) { return m_order.begin() + static_cast<std::ptrdiff_t>(i); };
+    std::nth_element(at(begin), at(middle), at(end), [&](std::uint32_t a, std::uint32_t b) {
+        const float first = m_samples[a].position[axis];
+        const float second = m_samples[b].position[axis];
+        return first != second ? first < second : a < b;
+    });
+    return middle;
+}
+
+// Parts samples where the first bit changes in which their codes differ; equal codes in the middle.
+std::size_t SurfaceTree::part_by_code(std::size_t begin, std::size_t end) const
+{
     const std::uint64_t differing = m_codes[begin] ^ m_codes[end - 1];
-    std::size_t middle = begin + (end - begin) / 2;
-    if (differing != 0) {
-        const std::uint64_t bit = std::bit_floor(differing);
-        const auto first = m_codes.begin() + static_cast<std::ptrdiff_t>(begin);
-        const auto last = m_codes.begin() + static_cast<std::ptrdiff_t>(end);
-        middle = static_cast<std::size_t>(
-            std::partition_point(first, last, [bit](std::uint64_t code) { return (code & bit) == 0; }) -
-            m_codes.begin());
-    }
-    build(begin, middle, false);
-    m_nodes[number].second = build(middle, end, false);
-    return number;
+    if (differing == 0)
+        return begin + (end - begin) / 2;
+    const std::uint64_t bit = std::bit_floor(differing);
+    const auto first = m_codes.begin() + static_cast<std::ptrdiff_t>(begin);
+    const auto last = m_codes.begin() + static_cast<std::ptrdiff_t>(end);
+    return static_cast<std::size_t>(
+        std::partition_point(first, last, [bit](std::uint64_t code) { return (code & bit) == 0; }) - m_codes.begin());
 }
 
 void SurfaceTree::weigh(const SurfaceBasis& basis, const PairTables& tables, const std::vector<float>& moments)

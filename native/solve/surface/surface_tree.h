@@ -3,6 +3,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <limits>
 #include <span>
 #include <vector>
 
@@ -95,6 +96,11 @@ private:
         Vec3f normal{0.0f};         // their mean
     };
 
+    struct Box {
+        Vec3f low{std::numeric_limits<float>::infinity()};
+        Vec3f high{-std::numeric_limits<float>::infinity()};
+    };
+
     // Light of a part of a cluster.
     struct Part {
         float weight;  // 0: dark
@@ -108,7 +114,10 @@ private:
     // `normal`: mean of the targets.
     static bool is_far(const Node& node, float distance, const Vec3f& normal, const Opening& opening);
     void weigh(const SurfaceBasis& basis, const PairTables& tables, const std::vector<float>& moments);
-    std::uint32_t build(std::size_t begin, std::size_t end, bool is_in_leaf);
+    Box box_of(std::size_t begin, std::size_t end) const;
+    Box build(std::size_t begin, std::size_t end, bool is_in_leaf);
+    std::size_t part_by_place(std::size_t begin, std::size_t end, const Box& box);
+    std::size_t part_by_code(std::size_t begin, std::size_t end) const;
     void list_lit();
     void gather_tip(const SurfaceBasis& basis, const std::vector<float>& moments, std::size_t number, float* sums);
     void gather_children(const SurfaceBasis& basis, const std::vector<float>& moments, std::size_t number, float* sums);
