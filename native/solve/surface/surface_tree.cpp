@@ -293,7 +293,6 @@ void SurfaceTree::gather(const SurfaceBasis& basis, const PairTables& tables, st
         m_clusters[node].moments = static_cast<std::uint32_t>(count + node);
         m_nodes[node].light = cluster.position;
         m_nodes[node].spread = 4.0f * cluster.spread;
-        m_nodes[node].variance = 1.0f - glm::dot(cluster.normal, cluster.normal);
         m_nodes[node].normal = cluster.normal;
     }
 }
@@ -411,7 +410,8 @@ bool SurfaceTree::is_far(const Node& node, float distance, const Vec3f& normal, 
     if (distance <= 0.0f || node.light_radius > max_radius * distance)
         return false;
     const float square = distance * distance;
-    const float size = node.spread + normal_weight * node.variance * square;
+    const float variance = node.variance();
+    const float size = node.spread + normal_weight * variance * square;
     if (opening.size > 0.0f)
         return size <= opening.size * opening.size * square;
     const std::uint32_t step = chord_step(distance - node.light_radius);
@@ -422,7 +422,7 @@ bool SurfaceTree::is_far(const Node& node, float distance, const Vec3f& normal, 
     const auto is_small = [&](float error) { return error * size * node.weight * opening.bound[row] <= 1.0f; };
     // Most clusters that are too large are so without a turn, which takes longer to find.
     return is_small(of_size) &&
-           is_small(of_size + edge_weight * turn_of_edge(node.normal - normal, node.variance, node.spread, square));
+           is_small(of_size + edge_weight * turn_of_edge(node.normal - normal, variance, node.spread, square));
 }
 
 void SurfaceTree::find_candidates(std::size_t begin, std::size_t end, const Opening& opening, float reach,

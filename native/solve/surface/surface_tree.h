@@ -82,7 +82,11 @@ public:
     void find(std::size_t leaf, const Opening& opening, float reach, Sources& sources) const;
 
 private:
-    struct Node {
+    // One line of the cache.
+    struct alignas(64) Node {
+        // Variance of the normals.
+        float variance() const { return 1.0f - glm::dot(normal, normal); }
+
         std::uint32_t begin = 0;  // its samples, in the tree's order
         std::uint32_t end = 0;
         std::uint32_t second = 0;  // its second child; the first one follows the node. 0: a leaf
@@ -92,9 +96,9 @@ private:
         Vec3f light{0.0f};          // position of the cluster
         float weight = 0.0f;        // of its light; 0: dark
         float spread = 0.0f;        // mean squared distance of the light from its position, m^2
-        float variance = 0.0f;      // of the normals
-        Vec3f normal{0.0f};         // their mean
+        Vec3f normal{0.0f};         // mean of the normals
     };
+    static_assert(sizeof(Node) == 64);
 
     struct Box {
         Vec3f low{std::numeric_limits<float>::infinity()};
