@@ -4,10 +4,10 @@
 #include <cmath>
 #include <cstdint>
 #include <numeric>
-#include <utility>
+#include <span>
 
 #include "base/threads.h"
-#include "simd/loops.h"
+#include "solve/textured/ratio_rows.h"
 
 namespace beamspread {
 
@@ -28,90 +28,67 @@ constexpr std::size_t block_side = 4;
 // Standard deviation of the Gaussian that averages the errors of blocks before they choose, blocks. As above.
 constexpr double choice_width = 2.0;
 
-class Gaussian {
-public:
-    Gaussian(double sigma, std::size_t width, std::size_t height) : m_width(width), m_height(height)
+// Weights of a Gaussian, and the texels that it reaches on either side.
+struct Gaussian {
+    explicit Gaussian(double sigma) : reach(static_cast<std::size_t>(std::ceil(3.0 * sigma)))
     {
-        const auto reach = static_cast<std::size_t>(std::ceil(3.0 * sigma));
         double sum = 0.0;
-        for (std::size_t i = 0; i <= reach; ++i)
-            m_weights.push_back(static_cast<float>(std::exp(-0.5 * static_cast<double>(i * i) / (sigma * sigma))));
-        for (std::size_t i = 0; i <= reach; ++i)
-            sum += (i == 0 ? 1.0 : 2.0) * static_cast<double>(m_weights[i]);
-        for (float& weight : m_weights)
+        for (std::size_t i = 0; i <= 2 * reach; ++i) {
+            const double away = static_cast<double>(i) - static_cast<double>(reach);
+            weights.push_back(sigma > 0.0 ? static_cast<float>(std::exp(-0.5 * away * away / (sigma * sigma))) : 1.0f);
+            sum += static_cast<double>(weights.back());
+        }
+        for (float& weight : weights)
             weight /= static_cast<float>(sum);
     }
 
-    // The texels at the border continue beyond it.
-    Map operator()(const Map& values) const
+    std::size_t reach;
+    std::vector<float> weights;
+};
+
+// Smooths rows of maps. The texels at the border continue beyond it.
+class RowSmoother {
+public:
+    RowSmoother(const Gaussian& gaussian, std::size_t width, std::size_t height)
+        : m_gaussian(gaussian),
+          m_width(width),
+          m_height(height),
+          m_padded(width + 2 * gaussian.reach),
+          m_rows(gaussian.weights.size())
     {
-        Map across(values.size()), both(values.size());
-        const auto reach = static_cast<std::ptrdiff_t>(m_weights.size()) - 1;
-        parallel_for(m_height, [&](std::size_t y) {
-            const auto width = static_cast<std::ptrdiff_t>(m_width);
-            Map padded(m_width + 2 * static_cast<std::size_t>(reach));
-            for (std::ptrdiff_t x = -reach; x < width + reach; ++x)
-                padded[static_cast<std::size_t>(x + reach)] =
-                    values[y * m_width + static_cast<std::size_t>(std::clamp<std::ptrdiff_t>(x, 0, width - 1))];
-            for (std::ptrdiff_t i = -reach; i <= reach; ++i)
-                add_scaled(across.data() + y * m_width, padded.data() + i + reach,
-                           m_weights[static_cast<std::size_t>(std::abs(i))], m_width);
-        });
-        parallel_for(m_height, [&](std::size_t y) {
-            for (std::ptrdiff_t i = -reach; i <= reach; ++i) {
-                const auto row = std::clamp<std::ptrdiff_t>(static_cast<std::ptrdiff_t>(y) + i, 0,
-                                                            static_cast<std::ptrdiff_t>(m_height) - 1);
-                add_scaled(both.data() + y * m_width, across.data() + static_cast<std::size_t>(row) * m_width,
-                           m_weights[static_cast<std::size_t>(std::abs(i))], m_width);
-            }
-        });
-        return both;
+    }
+
+    // Row y of the smoothed map.
+    void operator()(const float* map, std::size_t y, float* smoothed)
+    {
+        const std::size_t reach = m_gaussian.reach;
+        for (std::size_t k = 0; k < m_rows.size(); ++k)
+            m_rows[k] = map + (std::clamp(y + k, reach, m_height - 1 + reach) - reach) * m_width;
+        float* const middle = m_padded.data() + reach;
+        sum_rows(middle, m_rows, m_gaussian.weights, m_width);
+        std::fill_n(m_padded.data(), reach, middle[0]);
+        std::fill_n(middle + m_width, reach, middle[m_width - 1]);
+        for (std::size_t k = 0; k < m_rows.size(); ++k)
+            m_rows[k] = m_padded.data() + k;
+        sum_rows(smoothed, m_rows, m_gaussian.weights, m_width);
     }
 
 private:
+    const Gaussian& m_gaussian;
     std::size_t m_width;
     std::size_t m_height;
-    std::vector<float> m_weights;
+    Map m_padded;
+    std::vector<const float*> m_rows;
 };
 
-float ratio_or(float textured, float plain, float otherwise)
+Map smoothed(const Map& map, const Gaussian& gaussian, std::size_t width, std::size_t height)
 {
-    return plain > 0.0f ? textured / plain : otherwise;
-}
-
-// Ratios of the halves and of both together, at one width. Where no path found light the convention stays: 1.
-struct Ratios {
-    explicit Ratios(std::size_t count) : half{Map(count), Map(count)}, both(count) {}
-
-    std::array<Map, 2> half;
-    Map both;
-};
-
-Ratios ratios_of(const PathSums& sums, double sigma, std::size_t width, std::size_t height)
-{
-    PathSums smoothed;
-    if (sigma > 0.0) {
-        const Gaussian gaussian(sigma, width, height);
-        for (std::size_t h = 0; h < 2; ++h) {
-            smoothed.textured[h] = gaussian(sums.textured[h]);
-            smoothed.plain[h] = gaussian(sums.plain[h]);
-        }
-    }
-    const PathSums& now = sigma > 0.0 ? smoothed : sums;
-    Ratios ratios(width * height);
+    Map result(map.size());
     parallel_for(height, [&](std::size_t y) {
-        for (std::size_t i = y * width; i < (y + 1) * width; ++i) {
-            ratios.both[i] = ratio_or(now.textured[0][i] + now.textured[1][i], now.plain[0][i] + now.plain[1][i], 1.0f);
-            for (std::size_t h = 0; h < 2; ++h)
-                ratios.half[h][i] = ratio_or(now.textured[h][i], now.plain[h][i], ratios.both[i]);
-        }
+        RowSmoother smooth(gaussian, width, height);
+        smooth(map.data(), y, result.data() + y * width);
     });
-    return ratios;
-}
-
-double square(double value)
-{
-    return value * value;
+    return result;
 }
 
 // Blocks of a map, the last ones of a row or column with fewer texels.
@@ -133,37 +110,82 @@ struct Errors {
     Map variance;  // noise alone
 };
 
-Errors errors_of(const Ratios& now, const std::array<Map, 2>& fine, const std::vector<float>& scale, std::size_t width,
-                 std::size_t height)
+// Sums of both halves in a row.
+struct SumsRow {
+    explicit SumsRow(std::size_t width)
+        : textured{Map(width), Map(width), Map(width)}, plain{Map(width), Map(width), Map(width)}, one(width, 1.0f)
+    {
+    }
+
+    // Writes the ratios of the halves, and that of both. Where no path found light the convention stays: 1.
+    void divide(std::array<Map, 2>& halves, float* both)
+    {
+        const std::size_t width = one.size();
+        add_rows(textured[2].data(), textured[0].data(), textured[1].data(), width);
+        add_rows(plain[2].data(), plain[0].data(), plain[1].data(), width);
+        divide_rows(both, textured[2].data(), plain[2].data(), one.data(), width);
+        for (std::size_t h = 0; h < 2; ++h)
+            divide_rows(halves[h].data(), textured[h].data(), plain[h].data(), both, width);
+    }
+
+    std::array<Map, 3> textured;  // halves, both
+    std::array<Map, 3> plain;
+    Map one;
+};
+
+// Ratios of both halves together, and their errors, at some widths of which the first is 0.
+struct Smoothed {
+    std::vector<Map> ratios;
+    std::vector<Errors> errors;
+};
+
+Smoothed smoothed_ratios(const PathSums& sums, const View2D<const float>& scale, std::span<const double> sigmas)
 {
+    const std::size_t width = scale.width, height = scale.height;
     const Blocks blocks(width, height);
-    Errors errors{Map(blocks.count()), Map(blocks.count())};
-    parallel_for(blocks.height, [&](std::size_t row) {
-        for (std::size_t column = 0; column < blocks.width; ++column) {
-            double cost = 0.0, variance = 0.0;
-            const std::size_t y_end = std::min((row + 1) * block_side, height);
-            const std::size_t x_begin = column * block_side, x_end = std::min(x_begin + block_side, width);
-            for (std::size_t y = row * block_side; y < y_end; ++y) {
-                for (std::size_t i = y * width + x_begin; i < y * width + x_end; ++i) {
-                    // The squared blur, and the variance of the mean of both halves (Rousselle, Manzi, Zwicker 2013): half of
-                    // one half's, 1/2 (r0 - r1)^2, is left, and a half differs from the other finest one by the blur and
-                    // the variance of both.
-                    const auto s = static_cast<double>(scale[i]);
-                    const double crossed =
-                        0.5 * (square(s * (now.half[0][i] - fine[1][i])) + square(s * (now.half[1][i] - fine[0][i])));
-                    const double left = 0.5 * square(s * (now.half[0][i] - now.half[1][i]));
-                    const double finest = 0.5 * square(s * (fine[0][i] - fine[1][i]));
-                    cost += crossed - finest - 0.5 * left;
-                    variance += 0.5 * left;
+    const std::vector<Gaussian> gaussians(sigmas.begin(), sigmas.end());
+    Smoothed result;
+    for (std::size_t k = 0; k < sigmas.size(); ++k) {
+        result.ratios.emplace_back(width * height);
+        result.errors.push_back({Map(blocks.count()), Map(blocks.count())});
+    }
+    parallel_for(blocks.height, [&](std::size_t block_row) {
+        const std::size_t first = block_row * block_side, rows = std::min(block_side, height - first);
+        SumsRow row(width);
+        const std::array<Map, 2> empty{Map(width), Map(width)};
+        std::vector<std::array<Map, 2>> fine(rows, empty);
+        std::array<Map, 2> smooth = empty;
+        for (std::size_t k = 0; k < sigmas.size(); ++k) {
+            RowSmoother smoother(gaussians[k], width, height);
+            Map cost(width), variance(width);
+            for (std::size_t r = 0; r < rows; ++r) {
+                const std::size_t y = first + r;
+                for (std::size_t h = 0; h < 2; ++h) {
+                    smoother(sums.textured[h].data(), y, row.textured[h].data());
+                    smoother(sums.plain[h].data(), y, row.plain[h].data());
                 }
+                std::array<Map, 2>& now = k == 0 ? fine[r] : smooth;
+                row.divide(now, result.ratios[k].data() + y * width);
+                add_errors(cost.data(), variance.data(), {now[0].data(), now[1].data()},
+                           {fine[r][0].data(), fine[r][1].data()}, scale.row(y), width);
             }
-            const double texels = static_cast<double>((y_end - row * block_side) * (x_end - x_begin));
-            errors.cost[row * blocks.width + column] = static_cast<float>(cost / texels);
-            errors.variance[row * blocks.width + column] = static_cast<float>(variance / texels);
+            for (std::size_t column = 0; column < blocks.width; ++column) {
+                const std::size_t begin = column * block_side, end = std::min(begin + block_side, width);
+                const auto texels = static_cast<float>(rows * (end - begin));
+                const auto mean = [&](const Map& values) {
+                    return std::accumulate(values.data() + begin, values.data() + end, 0.0f) / texels;
+                };
+                result.errors[k].cost[block_row * blocks.width + column] = mean(cost);
+                result.errors[k].variance[block_row * blocks.width + column] = mean(variance);
+            }
         }
     });
-    const Gaussian around(choice_width, blocks.width, blocks.height);
-    return {around(errors.cost), around(errors.variance)};
+    const Gaussian around(choice_width);
+    for (Errors& errors : result.errors) {
+        errors.cost = smoothed(errors.cost, around, blocks.width, blocks.height);
+        errors.variance = smoothed(errors.variance, around, blocks.width, blocks.height);
+    }
+    return result;
 }
 
 // Weight of the right one of two neighbors at a texel, and the left one, along one axis.
@@ -183,55 +205,49 @@ Between between_blocks(std::size_t texel, std::size_t blocks)
 
 }  // namespace
 
-double smooth_ratio(const PathSums& sums, const std::vector<float>& scale, std::size_t width, std::size_t height,
-                    std::vector<float>& ratio)
+double smooth_ratio(const PathSums& sums, const View2D<const float>& scale, std::vector<float>& ratio)
 {
+    const std::size_t width = scale.width, height = scale.height;
     const Blocks blocks(width, height);
-    std::array<Map, widths.size()> ratios;
-    std::array<Errors, widths.size()> errors;
-    std::array<Map, 2> fine;
-    for (std::size_t k = 0; k < widths.size(); ++k) {
-        Ratios now = ratios_of(sums, widths[k], width, height);
-        errors[k] = errors_of(now, k == 0 ? now.half : fine, scale, width, height);
-        ratios[k] = std::move(now.both);
-        if (k == 0)
-            fine = std::move(now.half);
-    }
+    const Smoothed candidates = smoothed_ratios(sums, scale, widths);
     std::vector<std::uint8_t> choice(blocks.count());
     double error = 0.0;
     for (std::size_t b = 0; b < blocks.count(); ++b) {
         std::uint8_t best = 0;
         for (std::uint8_t k = 1; k < widths.size(); ++k)
-            if (errors[k].cost[b] < errors[best].cost[b])
+            if (candidates.errors[k].cost[b] < candidates.errors[best].cost[b])
                 best = k;
         choice[b] = best;
-        error += static_cast<double>(std::max(errors[best].cost[b], errors[best].variance[b]));
+        error += static_cast<double>(std::max(candidates.errors[best].cost[b], candidates.errors[best].variance[b]));
     }
     ratio.resize(width * height);
     std::vector<double> row_sums(height);
+    std::vector<Between> columns;
+    for (std::size_t x = 0; x < width; ++x)
+        columns.push_back(between_blocks(x, blocks.width));
     parallel_for(height, [&](std::size_t y) {
         const Between up = between_blocks(y, blocks.height);
         for (std::size_t x = 0; x < width; ++x) {
-            const Between across = between_blocks(x, blocks.width);
+            const Between& across = columns[x];
             const std::size_t i = y * width + x;
             const auto at = [&](std::size_t row, std::size_t column) {
-                return ratios[choice[row * blocks.width + column]][i];
+                return candidates.ratios[choice[row * blocks.width + column]][i];
             };
             const float below = std::lerp(at(up.left, across.left), at(up.left, across.right), across.weight);
             const float above = std::lerp(at(up.right, across.left), at(up.right, across.right), across.weight);
             ratio[i] = std::lerp(below, above, up.weight);
-            row_sums[y] += static_cast<double>(scale[i]) * ratio[i];
+            row_sums[y] += static_cast<double>(scale(y, x)) * ratio[i];
         }
     });
     const double mean = std::accumulate(row_sums.begin(), row_sums.end(), 0.0) / static_cast<double>(width * height);
     return mean > 0.0 ? std::sqrt(error / static_cast<double>(blocks.count())) / mean : 0.0;
 }
 
-double cost_of_smoothing(const PathSums& sums, const std::vector<float>& scale, std::size_t width, std::size_t height)
+double cost_of_smoothing(const PathSums& sums, const View2D<const float>& scale)
 {
-    const Ratios fine = ratios_of(sums, 0.0, width, height);
-    const Errors errors = errors_of(ratios_of(sums, compared_width, width, height), fine.half, scale, width, height);
-    return std::accumulate(errors.cost.begin(), errors.cost.end(), 0.0) / static_cast<double>(errors.cost.size());
+    const std::array<double, 2> sigmas{0.0, compared_width};
+    const Map& cost = smoothed_ratios(sums, scale, sigmas).errors[1].cost;
+    return std::accumulate(cost.begin(), cost.end(), 0.0) / static_cast<double>(cost.size());
 }
 
 }  // namespace beamspread

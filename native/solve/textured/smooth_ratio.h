@@ -5,6 +5,8 @@
 #include <cstddef>
 #include <vector>
 
+#include "base/view.h"
+
 namespace beamspread {
 
 // Sums of two independent halves of the paths, [half][texel].
@@ -13,13 +15,12 @@ struct PathSums {
     std::array<std::vector<float>, 2> plain;
 };
 
-// Writes the ratio textured / plain of each texel. `scale`: what it is multiplied by later; errors count in its units.
+// Writes the ratio textured / plain of each texel. `scale`: what it is multiplied by later, rows contiguous; errors count in its units.
 // Returns the estimated root mean square error of ratio x scale, over the mean of that.
-double smooth_ratio(const PathSums& sums, const std::vector<float>& scale, std::size_t width, std::size_t height,
-                    std::vector<float>& ratio);
+double smooth_ratio(const PathSums& sums, const View2D<const float>& scale, std::vector<float>& ratio);
 
 // Estimated mean squared error of ratio x scale if all texels are smoothed by one Gaussian: without choices, which favor
 // errors that are too low by chance.
-double cost_of_smoothing(const PathSums& sums, const std::vector<float>& scale, std::size_t width, std::size_t height);
+double cost_of_smoothing(const PathSums& sums, const View2D<const float>& scale);
 
 }  // namespace beamspread

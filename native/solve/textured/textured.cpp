@@ -156,13 +156,16 @@ public:
     // Scatterings of all texels in the walks so far.
     double products() const { return m_products; }
 
-    // Writes the ratio of each texel, with a power of the factor of light that leaves; returns the estimated error.
+    // Writes the ratio of each texel; returns the estimated error.
+    double ratio(std::vector<float>& ratio) const { return smooth_ratio(m_sums, m_problem.convention, ratio); }
+
+    // The same with a power of the factor of light that leaves.
     double ratio(float power, std::vector<float>& ratio) const
     {
         std::vector<std::size_t> rows(m_problem.albedo.height);
         std::iota(rows.begin(), rows.end(), std::size_t{0});
         const Leaving leaving(*this, rows, power);
-        const double error = smooth_ratio(leaving.sums, leaving.scale, m_problem.albedo.width, rows.size(), ratio);
+        const double error = smooth_ratio(leaving.sums, leaving.view(), ratio);
         std::ranges::transform(ratio, leaving.factor, ratio.begin(), std::divides<>());
         return error;
     }
@@ -175,7 +178,7 @@ public:
         float best = 1.0f;
         for (const float power : leaving_powers) {
             const Leaving leaving(*this, few, power);
-            const double cost = cost_of_smoothing(leaving.sums, leaving.scale, m_problem.albedo.width, few.size());
+            const double cost = cost_of_smoothing(leaving.sums, leaving.view());
             if (cost < least) {
                 least = cost;
                 best = power;
@@ -199,7 +202,7 @@ private:
     // times a smooth ratio would draw lines along borders where light hardly follows the factor.
     struct Leaving {
         Leaving(const Textured& all, std::span<const std::size_t> rows, float power)
-            : scale(rows.size() * all.m_problem.albedo.width), factor(scale.size())
+            : height(rows.size()), scale(height * all.m_problem.albedo.width), factor(scale.size())
         {
             const std::size_t width = all.m_problem.albedo.width;
             for (std::size_t h = 0; h < 2; ++h) {
@@ -219,6 +222,12 @@ private:
             });
         }
 
+        View2D<const float> view() const
+        {
+            return {scale.data(), height, scale.size() / height, static_cast<std::ptrdiff_t>(scale.size() / height)};
+        }
+
+        std::size_t height;
         PathSums sums;
         std::vector<float> scale;
         std::vector<float> factor;  // over the power of itself
@@ -324,7 +333,7 @@ TexturedError solve_textured(const TexturedProblem& problem, Progress& progress,
             left -= share;
             textured.add(units, [&](double part) { progress.advance(share * part); });
             result.walks += units * unit;
-            result.error = textured.ratio(1.0f, ratio);
+            result.error = textured.ratio(ratio);
             const auto walks = static_cast<double>(result.walks);
             const double wanted = walks * std::pow(result.error / problem.tolerance, 2);
             const double affordable = std::min(static_cast<double>(problem.max_walks),

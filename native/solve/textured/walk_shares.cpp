@@ -37,9 +37,12 @@ std::vector<double> power_of_tiles(const View2D<const float>& light, const Subla
     const std::size_t rows = sublattices.side() * tile_rows, columns = sublattices.side() * tile_columns;
     std::vector<double> powers(sublattices.tile_count());
     parallel_for(sublattices.tiles_down(), [&](std::size_t down) {
+        std::vector<double> sums(light.width);
         for (std::size_t y = down * rows; y < std::min((down + 1) * rows, light.height); ++y)
             for (std::size_t x = 0; x < light.width; ++x)
-                powers[down * sublattices.tiles_across() + x / columns] += light(y, x);
+                sums[x] += static_cast<double>(light(y, x));
+        for (std::size_t x = 0; x < light.width; ++x)
+            powers[down * sublattices.tiles_across() + x / columns] += sums[x];
     });
     return powers;
 }
