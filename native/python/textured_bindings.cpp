@@ -78,7 +78,8 @@ lights : sequence of (irradiance, travel)
 side : {"reflected", "transmitted"}
     Face that light leaves: that which it entered, or the far one of a slab.
 tolerance : float
-    Wanted root mean square error of a texel, relative to the mean. It is not reached where it would take too long.
+    Wanted root mean square error of texels, over the root mean square of the luminance; that of the sum is an eighth.
+    It is not reached where it would take too long.
 max_walks : int
     Largest number of walks for each texel.
 seed : int

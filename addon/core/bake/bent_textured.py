@@ -67,8 +67,8 @@ def ratio_on_planes(
     convention = np.where(image.is_read[..., None], np.maximum(convention, 0), 0)
     result, pitches = convention.copy(), (planes[0].pitch,) * 2
     plane = TexturedPlane(spreading.sources, albedo, factor, material.albedo, material.mean_free_path, pitches)
-    # Errors count where results are read, relative to the mean there; results are means of several planes.
-    scale = float(np.sqrt(image.is_read.mean() * (image.noise_left**2).mean()))
+    # Results are means of several planes.
+    scale = float(np.sqrt((image.noise_left**2).mean()))
     options = effort.noise / max(scale, 1e-6), effort.max_walks, settings.threads
     noise = plane.correct(result, light.beams(image, middles), side, *options, progress)
     if spreading.reports.texture:

@@ -154,7 +154,8 @@ def convolve(
         Unscattered light that crosses the slab is included. Rows, columns and directions stay those of the lit side.
         Half-spaces and samples know no far side.
     noise : float
-        Wanted root mean square error of a texel by the paths through a map of albedos, relative to the mean.
+        Wanted root mean square error of texels by the paths through a map of albedos, relative to the root mean square
+        of the luminance: errors count where the light is.
     report_noise : callable, optional
         report_noise(error) takes that error as estimated, of the worst channel. It is larger than `noise` where that
         would take more than some seconds, as between black and nearly white.

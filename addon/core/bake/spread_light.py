@@ -28,7 +28,7 @@ MIN_RAYS, MAX_RAYS, MAX_RAYS_BY_SAMPLES = 8, 1024, 4096
 MAX_STORED_BYTES = 512 << 20
 
 # Fraction of a bake's time in which light in a texture's albedos is found.
-TEXTURED_PART = 0.85
+TEXTURED_PART = 0.6
 
 
 def spread(grids: Sequence[AnyGrid], spreading: Spreading, progress: Callback | None = None) -> list[np.ndarray]:

@@ -15,7 +15,7 @@ from ..progress import Progress
 from .directions import Beams, beams_of
 
 NOISE = 0.01
-"""Wanted root mean square error of a texel, relative to the mean. Smaller: longer."""
+"""Wanted root mean square error of texels, relative to that of the luminance. Smaller: longer."""
 
 MAX_WALKS = 4096
 """Largest number of walks for each texel. More: less noise where albedos differ most, and longer."""
@@ -162,7 +162,7 @@ class TexturedPlane:
         threads: int,
         progress: Progress,
     ) -> float:
-        """Correct the convention's luminance (H, W, 3) in place; the estimated noise, relative to the mean."""
+        """Correct the convention's luminance (H, W, 3) in place; the estimated noise, as `NOISE`."""
         worst = 0.0
         for c, part in enumerate(progress.split([1.0] * 3)):
             like = [before for before in range(c) if self._is_like(before, c, beams)]

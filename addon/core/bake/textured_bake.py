@@ -78,7 +78,7 @@ def corrected(side: str, grid: AnyGrid, luminance: NDArray, spreading: Spreading
     """Luminance (H, W, 3) of light on one side of a grid as its texels scatter it, from that of the convention."""
     if isinstance(grid, BentGrid):
         return luminance * ratio_on_planes(side, grid, luminance, spreading, progress)
-    effort, settings, material = spreading.effort, spreading.settings, spreading.material
+    effort, settings, material = spreading.effort.of_plane(grid.texels), spreading.settings, spreading.material
     beams = arriving_beams(grid, spreading.illumination, settings, effort)
     beams = [(light * grid.coverage[..., None], way) for light, way in beams]
     pad = _mirrored_texels(grid)

@@ -28,6 +28,10 @@ constexpr std::size_t block_side = 4;
 // Standard deviation of the Gaussian that averages the errors of blocks before they choose, blocks. As above.
 constexpr double choice_width = 2.0;
 
+// Blocks along a side of the regions whose mean errors are estimated. Larger: less noise of these; smaller: errors of few
+// texels next to others count as they are.
+constexpr std::size_t region_side = 16;
+
 // Weights of a Gaussian, and the texels that it reaches on either side.
 struct Gaussian {
     explicit Gaussian(double sigma) : reach(static_cast<std::size_t>(std::ceil(3.0 * sigma)))
@@ -188,6 +192,11 @@ Smoothed smoothed_ratios(const PathSums& sums, const View2D<const float>& scale,
     return result;
 }
 
+double square(double value)
+{
+    return value * value;
+}
+
 // Weight of the right one of two neighbors at a texel, and the left one, along one axis.
 struct Between {
     std::size_t left;
@@ -211,15 +220,22 @@ double smooth_ratio(const PathSums& sums, const View2D<const float>& scale, std:
     const Blocks blocks(width, height);
     const Smoothed candidates = smoothed_ratios(sums, scale, widths);
     std::vector<std::uint8_t> choice(blocks.count());
-    double error = 0.0;
+    const std::size_t regions = (blocks.width + region_side - 1) / region_side;
+    std::vector<double> costs((blocks.height + region_side - 1) / region_side * regions), variances(costs.size());
     for (std::size_t b = 0; b < blocks.count(); ++b) {
         std::uint8_t best = 0;
         for (std::uint8_t k = 1; k < widths.size(); ++k)
             if (candidates.errors[k].cost[b] < candidates.errors[best].cost[b])
                 best = k;
         choice[b] = best;
-        error += static_cast<double>(std::max(candidates.errors[best].cost[b], candidates.errors[best].variance[b]));
+        const std::size_t region = b / blocks.width / region_side * regions + b % blocks.width / region_side;
+        costs[region] += static_cast<double>(candidates.errors[best].cost[b]);
+        variances[region] += static_cast<double>(candidates.errors[best].variance[b]);
     }
+    // The noise of the costs would count as an error if the larger one of a block's two did.
+    double error = 0.0;
+    for (std::size_t r = 0; r < costs.size(); ++r)
+        error += std::max(costs[r], variances[r]);
     ratio.resize(width * height);
     std::vector<double> row_sums(height);
     std::vector<Between> columns;
@@ -236,11 +252,11 @@ double smooth_ratio(const PathSums& sums, const View2D<const float>& scale, std:
             const float below = std::lerp(at(up.left, across.left), at(up.left, across.right), across.weight);
             const float above = std::lerp(at(up.right, across.left), at(up.right, across.right), across.weight);
             ratio[i] = std::lerp(below, above, up.weight);
-            row_sums[y] += static_cast<double>(scale(y, x)) * ratio[i];
+            row_sums[y] += square(static_cast<double>(scale(y, x)) * static_cast<double>(ratio[i]));
         }
     });
-    const double mean = std::accumulate(row_sums.begin(), row_sums.end(), 0.0) / static_cast<double>(width * height);
-    return mean > 0.0 ? std::sqrt(error / static_cast<double>(blocks.count())) / mean : 0.0;
+    const double power = std::accumulate(row_sums.begin(), row_sums.end(), 0.0) / static_cast<double>(width * height);
+    return power > 0.0 ? std::sqrt(error / static_cast<double>(blocks.count()) / power) : 0.0;
 }
 
 double cost_of_smoothing(const PathSums& sums, const View2D<const float>& scale)

@@ -28,8 +28,12 @@ namespace {
 constexpr std::size_t unit = 32;
 
 // Units of the first round, which shows the noise, and the most of a round relative to all before.
-constexpr std::size_t first_units = 4;
-constexpr std::size_t max_growth = 7;
+constexpr std::size_t first_units = 8;
+constexpr std::size_t max_growth = 1;
+
+// Wanted error of the sum of all texels, relative to that of a texel: if light has one direction, errors of texels of the
+// same paths are alike everywhere. Smaller: sums are surer, and longer.
+constexpr double total_part = 0.125;
 
 // Farthest place from an exit, in texels, that fewer paths than this fraction pass; they count as at that distance.
 constexpr double rarely = 1e-3;
@@ -119,6 +123,7 @@ public:
         for (std::size_t h = 0; h < 2; ++h) {
             m_sums.textured[h].resize(texels());
             m_sums.plain[h].resize(texels());
+            m_totals[h].resize(m_sublattices.count());
         }
     }
 
@@ -143,10 +148,16 @@ public:
             }
             places += taken;
             const std::size_t width = m_problem.albedo.width;
+            Totals totals;
             m_sublattices.for_texels(sublattice, [&](std::size_t y, std::size_t x, std::size_t k) {
-                m_sums.textured[half][y * width + x] += textured[k] / m_problem.factor(y, x);
+                const float factor = m_problem.factor(y, x);
+                m_sums.textured[half][y * width + x] += textured[k] / factor;
                 m_sums.plain[half][y * width + x] += plain[k];
+                totals.textured += static_cast<double>(textured[k]);
+                totals.plain += static_cast<double>(plain[k] * factor);
             });
+            m_totals[half][sublattice].textured += totals.textured;
+            m_totals[half][sublattice].plain += totals.plain;
             advance(1.0 / static_cast<double>(2 * m_sublattices.count()));
         });
         const std::size_t tiles = m_sublattices.count() * m_sublattices.tile_count();
@@ -155,6 +166,28 @@ public:
 
     // Scatterings of all texels in the walks so far.
     double products() const { return m_products; }
+
+    // Estimated standard error of the ratio of all light, relative to it. Halves of the same texels are compared.
+    double total_error() const
+    {
+        Totals all;
+        for (const std::vector<Totals>& half : m_totals) {
+            for (const Totals& totals : half) {
+                all.textured += totals.textured;
+                all.plain += totals.plain;
+            }
+        }
+        if (!(all.textured > 0.0 && all.plain > 0.0))
+            return 0.0;
+        double variance = 0.0;
+        for (std::size_t s = 0; s < m_sublattices.count(); ++s) {
+            const double textured = m_totals[0][s].textured - m_totals[1][s].textured;
+            const double plain = m_totals[0][s].plain - m_totals[1][s].plain;
+            const double difference = textured / all.textured - plain / all.plain;
+            variance += difference * difference;
+        }
+        return std::sqrt(variance);
+    }
 
     // Writes the ratio of each texel; returns the estimated error.
     double ratio(std::vector<float>& ratio) const { return smooth_ratio(m_sums, m_problem.convention, ratio); }
@@ -188,6 +221,12 @@ public:
     }
 
 private:
+    // Light of all texels of a sublattice.
+    struct Totals {
+        double textured = 0.0;
+        double plain = 0.0;
+    };
+
     static std::vector<std::size_t> strips(std::size_t height)
     {
         const std::size_t step = std::max<std::size_t>((height + choice_rows - 1) / choice_rows, 1);
@@ -289,6 +328,7 @@ private:
     WalkShares m_shares;
     std::vector<AlignedVector<float>> m_light;
     PathSums m_sums;
+    std::array<std::vector<Totals>, 2> m_totals;  // [half][sublattice]
     std::uint64_t m_rounds = 0;
     double m_products = 0.0;
 };
@@ -335,7 +375,8 @@ TexturedError solve_textured(const TexturedProblem& problem, Progress& progress,
             result.walks += units * unit;
             result.error = textured.ratio(ratio);
             const auto walks = static_cast<double>(result.walks);
-            const double wanted = walks * std::pow(result.error / problem.tolerance, 2);
+            const double excess = std::max(result.error, textured.total_error() / total_part) / problem.tolerance;
+            const double wanted = walks * excess * excess;
             const double affordable = std::min(static_cast<double>(problem.max_walks),
                                                problem.max_products / std::max(textured.products(), 1.0) * walks);
             const double more =

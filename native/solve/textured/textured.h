@@ -33,7 +33,7 @@ struct TexturedProblem {
     View2D<const float> convention;  // luminance by the convention
     std::vector<TexturedLight> lights;
     bool is_through = false;  // light leaves through the far face of a slab
-    double tolerance = 0.01;  // wanted error of a texel, root mean square, relative to the mean luminance
+    double tolerance = 0.01;  // wanted error of texels, root mean square, over that of the luminance
     std::size_t max_walks = 4096;  // for each texel
     double max_products = 6e9;  // scatterings of all texels; a core does a few 10^9 a second
     std::uint64_t seed = 0;
