@@ -262,7 +262,8 @@ double smooth_ratio(const PathSums& sums, const View2D<const float>& scale, std:
 double cost_of_smoothing(const PathSums& sums, const View2D<const float>& scale)
 {
     const std::array<double, 2> sigmas{0.0, compared_width};
-    const Map& cost = smoothed_ratios(sums, scale, sigmas).errors[1].cost;
+    const Smoothed candidates = smoothed_ratios(sums, scale, sigmas);
+    const Map& cost = candidates.errors[1].cost;
     return std::accumulate(cost.begin(), cost.end(), 0.0) / static_cast<double>(cost.size());
 }
 
