@@ -59,7 +59,7 @@ BENT, BENT_TEXEL, BENT_CHANNEL, BENT_POWER = 1.6, 4.5e-6, 10.5e-6, 0.55
 LIT_BY_LAMPS = 0.5
 
 # Seconds per texel of light in a texture's albedos: between 1.5e-6 where colors are alike and 20e-6 where they differ.
-TEXTURED = 10e-6
+TEXTURED = 14e-6
 # The same on surfaces that bend, in any case, and by the root of the number of texels.
 BENT_TEXTURED, BENT_TEXTURED_ROOT = 3.5, 0.05
 
