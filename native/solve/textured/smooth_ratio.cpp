@@ -223,11 +223,11 @@ double smooth_ratio(const PathSums& sums, const View2D<const float>& scale, std:
     const std::size_t regions = (blocks.width + region_side - 1) / region_side;
     std::vector<double> costs((blocks.height + region_side - 1) / region_side * regions), variances(costs.size());
     for (std::size_t b = 0; b < blocks.count(); ++b) {
-        std::uint8_t best = 0;
-        for (std::uint8_t k = 1; k < widths.size(); ++k)
+        std::size_t best = 0;
+        for (std::size_t k = 1; k < widths.size(); ++k)
             if (candidates.errors[k].cost[b] < candidates.errors[best].cost[b])
                 best = k;
-        choice[b] = best;
+        choice[b] = static_cast<std::uint8_t>(best);
         const std::size_t region = b / blocks.width / region_side * regions + b % blocks.width / region_side;
         costs[region] += static_cast<double>(candidates.errors[best].cost[b]);
         variances[region] += static_cast<double>(candidates.errors[best].variance[b]);
