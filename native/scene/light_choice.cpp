@@ -33,7 +33,7 @@ float mean(const Vec3f& color)
     return (color.x + color.y + color.z) / 3.0f;
 }
 
-// Where rays start: the triangle on which the point lies, and its own light, are behind.
+// Above the triangle of the point, which lies behind rays that start there, and with it the light that it gives.
 Vec3 start_of(const ShadingPoint& point)
 {
     return point.position + point.normal * point.rounding;

@@ -22,11 +22,10 @@ from ...core.time_left import duration
 from .. import compat
 from ..node.draw import bent_materials
 from ..node.find import BakeTarget, targets_of
-from ..read.geometry import lights_surfaces
 from ..read.lamps import fault, is_portal, read_lamp
 from ..read.node_kinds import NodeKinds, all_known, closures_of, kinds_of
 from ..read.scene_cache import scene_cache
-from ..read.visibility import SURFACE_TYPES, by_name, placed, render_visible_names
+from ..read.visibility import SURFACE_TYPES, by_name, lights_surfaces, placed, render_visible_names
 from .rays import CLEAR, Look, Tracer, places_for
 from .state import Announced, state
 from .target_shape import Shape, grid_of, grid_of_bent, shape_of

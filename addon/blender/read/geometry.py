@@ -22,6 +22,7 @@ from .image_nodes import UVTransform
 from .reflection import MaterialReflection, MediumOf, reflection_of
 from .scene_cache import SceneCache
 from .transparency import MaterialTransmittance, transmittance_of
+from .visibility import casts_shadows, lights_surfaces
 
 OWN_MAP = "Beamspread"
 """Name of UV maps that bakes make."""
@@ -133,17 +134,6 @@ def lost_triangles(name: str, count: int) -> Message:
 def lost_instance(name: str) -> Message:
     """Warning about an object, or an instance of it, that is at no finite position."""
     return warning(name, f"'{name}' is left out. {INFINITE_MATRIX}", MATRIX_REMEDY)
-
-
-def casts_shadows(obj, instancer) -> bool:
-    """True if an object casts shadows; `instancer` is the object that instances it, or None."""
-    return all(getattr(owner, "visible_shadow", True) for owner in (obj, instancer) if owner is not None)
-
-
-def lights_surfaces(obj, instancer) -> bool:
-    """True if the light of an object falls on surfaces; `instancer` is the object that instances it, or None."""
-    asks_instancer = instancer is not None and (obj.type != "LIGHT" or compat.instancer_hides_lamps())
-    return obj.visible_diffuse and (not asks_instancer or instancer.visible_diffuse)
 
 
 def mesh_key(obj) -> tuple:

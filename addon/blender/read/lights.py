@@ -14,22 +14,22 @@ from ...core.scene.illumination import Illumination
 from ...core.scene.lights import Light
 from .. import compat
 from .emitters import VARYING, EmissiveMesh, radiance_of
-from .geometry import (
-    GEOMETRY_TYPES,
-    OccluderReader,
-    casts_shadows,
-    lights_surfaces,
-    lost_instance,
-    lost_triangles,
-    shapes_of,
-)
+from .geometry import GEOMETRY_TYPES, OccluderReader, lost_instance, lost_triangles, shapes_of
 from .image_nodes import missing_images
 from .lamps import fault, is_portal, read_lamp
 from .nodes import InputSocket, Links, surface_of
 from .reflection import MediumOf
 from .scene_cache import SceneCache
 from .transparency import transmittance_of
-from .visibility import left_out, left_out_of_world, render_visible_names, renders, with_instanced
+from .visibility import (
+    casts_shadows,
+    left_out,
+    left_out_of_world,
+    lights_surfaces,
+    render_visible_names,
+    renders,
+    with_instanced,
+)
 from .world_light import read_world
 
 

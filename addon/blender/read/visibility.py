@@ -122,6 +122,17 @@ def renders(instance, visible: set[str]) -> bool:
     return not obj.is_instancer or obj.show_instancer_for_render
 
 
+def casts_shadows(obj, instancer) -> bool:
+    """True if an object casts shadows; `instancer` is the object that instances it, or None."""
+    return all(getattr(owner, "visible_shadow", True) for owner in (obj, instancer) if owner is not None)
+
+
+def lights_surfaces(obj, instancer) -> bool:
+    """True if the light of an object falls on surfaces; `instancer` is the object that instances it, or None."""
+    asks_instancer = instancer is not None and (obj.type != "LIGHT" or compat.instancer_hides_lamps())
+    return obj.visible_diffuse and (not asks_instancer or instancer.visible_diffuse)
+
+
 @contextmanager
 def as_rendered(view_layer):
     """Make the viewport's depsgraph equal to a render's while a `with` block lasts.

@@ -16,12 +16,19 @@ from ... import compat
 from ...node.find import find_node_in_groups
 from ...read.digests import TreeDigest, digest, digest_of_mesh, values_of
 from ...read.emitters import VARYING, radiance_of
-from ...read.geometry import casts_shadows, lights_surfaces
 from ...read.lamps import is_portal, read_lamp
 from ...read.lights import links_of
 from ...read.scene_cache import scene_cache
 from ...read.transparency import transmittance_of
-from ...read.visibility import SOLID_TYPES, SURFACE_TYPES, placed, render_visible_names, renders
+from ...read.visibility import (
+    SOLID_TYPES,
+    SURFACE_TYPES,
+    casts_shadows,
+    lights_surfaces,
+    placed,
+    render_visible_names,
+    renders,
+)
 
 # Blender changes the number of trails on loading.
 _PARTICLE_LOOKS = set(bpy.types.ID.bl_rna.properties.keys()) | {"animation_data", "trail_count"}
