@@ -108,3 +108,61 @@ def test_a_large_bake_that_takes_much_less_is_not_refused(size, medium, least):
     peak, is_allowed = peak_of(1.4, size, "fft", ("lamp", "world"), COLORED, medium)
     assert peak > least
     assert is_allowed
+
+
+PLANES = """
+import sys
+
+sys.path.insert(0, {tests!r})
+from dataclasses import replace
+
+import numpy as np
+from bakes import SETTINGS, bake, square
+from beamspread.core.material import Material
+from beamspread.core.scene.illumination import Illumination
+from beamspread.core.scene.lights import PointLight, SunLight
+
+kind, texture, side = {light!r}, {texture!r}, {side}
+common = "Light", 1.0, (1.0, 1.0, 1.0), True
+light = SunLight(*common, (0.6, 0.0, -0.8)) if kind == "sun" else PointLight(*common, (0.0, 0.0, 0.3))
+y, x = np.mgrid[:side, :side]
+veins = (0.87 + 0.12 * np.abs(np.sin(0.05 * x + np.sin(0.035 * y))))[..., None] * (1, 0.98, 0.95)
+veins = veins.astype(np.float32)
+
+
+def status(key):
+    return next(int(line.split()[1]) for line in open("/proc/self/status") if line.startswith(key)) * 1024
+
+
+def run(size):
+    grid = square(size, side=size / 1024)
+    values = np.ascontiguousarray(veins[:size, :size])
+    if texture == "scattered":
+        grid = replace(grid, albedo=values)
+    elif texture == "multiplied":
+        values **= np.float32([1, 2, 3])  # light of one color in all texels would share its moments
+        grid = replace(grid, color_in=values, color_out=values)
+    material = Material(albedo=(0.9,) * 3, mean_free_path=(1 / 1024, 0.8 / 1024, 0.6 / 1024), anisotropy=0.8)
+    bake(grid, Illumination([light]), material, 0.0, SETTINGS)
+
+
+run(32)
+before = status("VmRSS")
+open("/proc/self/clear_refs", "w").write("5")
+run(side)
+print((status("VmHWM") - before) / (4 * side**2))
+"""
+
+
+@pytest.mark.skipif(not Path("/proc/self/clear_refs").exists(), reason="peaks are read as Linux tells them")
+@pytest.mark.parametrize(("light", "other"), [("sun", "none"), ("lamp", "multiplied")])
+def test_an_albedo_of_each_texel_takes_few_planes(light, other):
+    """At most 12 planes of floats, one for each texel, of which the map has three. Beyond a bake of one albedo; under a
+    lamp beyond one of a texture that multiplies light, which has moments for each channel, too.
+    """
+    peaks = []
+    for texture in (other, "scattered"):
+        code = PLANES.format(tests=str(Path(__file__).parents[1]), light=light, texture=texture, side=1024)
+        done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+        peaks.append(float(done.stdout))
+    assert peaks[1] - peaks[0] < 12

@@ -219,6 +219,41 @@ def test_walks_belong_to_the_lights_that_shine_there():
     assert 0.7 < error(8) / error(1) < 1.6
 
 
+@pytest.mark.parametrize("size", [(24, 20), (12, 10), (30, 7)])
+def test_light_of_other_texels_is_that_of_the_nearest(size):
+    """Maps with a half or a fourth of the texels along a side are kept as they are."""
+    light = np.random.default_rng(1).random(size).astype(np.float32)
+    rows, columns = ((np.arange(count) + 0.5) * known // count for count, known in zip((48, 40), size))
+    whole = light[rows.astype(int)[:, None], columns.astype(int)]
+    even = np.ascontiguousarray(convolve(whole, DOWN, LDF, 0.9, 1.0, 1.0)[..., 0])
+    arguments = LDF.medium, (1.0, 1.0), np.float32(STRIPES), np.ones((48, 40), np.float32), 0.9, even
+    one, other = (native.textured(*arguments, [(of, DOWN)], "reflected", 1e-6, 64)[0] for of in (whole, light))
+    np.testing.assert_array_equal(one, other)
+
+
+def test_channels_of_maps_coverage_and_a_result_in_place():
+    """As each channel alone, and as light that is less by the coverage."""
+    random = np.random.default_rng(2)
+    light, part = random.random((48, 40, 3), np.float32), random.random((48, 40), np.float32)
+    even = np.ascontiguousarray(convolve(light, DOWN, LDF, 0.9, 1.0, 1.0))
+    maps = np.repeat(np.float32(STRIPES)[..., None], 3, axis=2) ** np.float32([1, 2, 3])
+    factor = random.uniform(0.5, 1, maps.shape).astype(np.float32)
+    rest, result = ("reflected", 1e-6, 64), even.copy()
+    native.textured(
+        *(LDF.medium, (1.0, 1.0), maps, factor, 0.9, result, [(light, DOWN)], *rest),
+        channel=1,
+        coverage=part,
+        result=result,
+    )
+    alone, factor_alone, even_alone, less = (
+        np.ascontiguousarray(values[..., 1]) for values in (maps, factor, even, light * part[..., None])
+    )
+    arguments = LDF.medium, (1.0, 1.0), alone, factor_alone, 0.9, even_alone, [(less, DOWN)]
+    # Products of light and coverage are rounded in another order.
+    np.testing.assert_allclose(result[..., 1], native.textured(*arguments, *rest)[0], rtol=1e-5)
+    np.testing.assert_array_equal(result[..., ::2], even[..., ::2])
+
+
 def test_the_bench_runs_in_small():
     bench = Path(__file__).resolve().parents[1] / "bench" / "textured.py"
     done = subprocess.run([sys.executable, str(bench), "32"], capture_output=True, text=True, check=True)

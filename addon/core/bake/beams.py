@@ -11,7 +11,6 @@ from ..native import native
 from ..scene.bent_grid import AnyGrid
 from ..scene.illumination import Illumination
 from ..scene.lights import Light, WorldLight
-from ..scene.sampling import resized
 from .bake_settings import BakeSettings
 from .directions import SURVEY_TEXELS, Beams, Splitter
 from .mean_light import MEAN_WORLD_ROWS
@@ -26,15 +25,15 @@ GRAZING = 0.05
 
 
 def arriving_beams(grid: AnyGrid, illumination: Illumination, settings: BakeSettings, effort: Effort) -> Beams:
-    """Light of a few directions on a grid that stands for all lights, gathered at fewer texels where it has many."""
+    """Light of a few directions on a grid that stands for all lights, at fewer texels where the grid has many."""
     lights = lights_before(grid, illumination)
     surveys = surveyed(grid.coarse(SURVEY_TEXELS), lights, settings, effort)
-    target = grid.coarse(effort.texels)
+    target = grid.gathering(effort.texels)
     splitter = Splitter.of(surveys, effort.max_own, effort.is_split)
     for number, light in enumerate(lights.lights):
         for part, way in rays_of(target, light, lights, settings, effort):
             splitter.add(number, part, way)
-    return [(resized(light, grid.height, grid.width, is_smooth=False), way) for light, way in splitter.beams]
+    return splitter.beams
 
 
 def lights_before(grid: AnyGrid, illumination: Illumination) -> Illumination:

@@ -37,7 +37,7 @@ ANGLE_DIGITS = 1
 """Digits of the angles, degrees, between which light is split. More: last bits of the light that change a few paths."""
 
 Beams = list[tuple[NDArray[np.float32], NDArray[np.float64]]]
-"""Irradiance (H, W, 3), and the direction of travel of each."""
+"""Irradiance (H, W, 3), of any size, and the direction of travel of each."""
 
 
 @dataclass(frozen=True)

@@ -27,6 +27,10 @@ by up to the third: dark textures return few of them. Larger: less noise there, 
 LEAST_FACTOR = 0.1
 """Smallest factor by which the convention multiplies light. Smaller: the ratio to the truth has more noise in black."""
 
+GATHERED_TEXELS = 512
+"""Least texels along the longer side at which light is split between directions. More: memory, and sharper shadows in
+the correction."""
+
 SOLVER_PART = 0.3
 """Fraction of the time that the convention takes."""
 
@@ -67,13 +71,15 @@ def textured_luminance(
     albedos = checked_map(albedo, lights[0][0].shape)
     solving, correcting = progress.split([SOLVER_PART, 1 - SOLVER_PART])
     tables = [reflectance_table(source) for source in sources]
-    channels = [Convention.of([table.reflectance(albedos[..., c])], table) for c, table in enumerate(tables)]
-    factors = np.stack([channel.factors[0] for channel in channels], -1)
-    entering = [(np.ascontiguousarray(light * factors), way) for light, way in lights]
-    means = tuple(channel.albedo for channel in channels)
-    result = convention(entering, means, solving) * factors
+    factors, means = np.empty_like(albedos), []
+    for c, table in enumerate(tables):
+        channel = Convention.of([table.reflectance(albedos[..., c])], table)
+        factors[..., c] = channel.factors[0]
+        means.append(channel.albedo)
+    result = convention([(light * factors, way) for light, way in lights], means, solving)
+    result *= factors
     plane = TexturedPlane(sources, albedos, factors, means, mean_free_path, pitch)
-    worst = plane.correct(result, beams_of(lights), side, noise, MAX_WALKS, threads, correcting)
+    worst = plane.correct(result, beams_of(map(gathered, lights)), side, noise, MAX_WALKS, threads, correcting)
     if report_noise:
         report_noise(worst)
     return result
@@ -87,6 +93,23 @@ def checked_map(albedo: ArrayLike, shape: tuple[int, ...]) -> NDArray[np.float32
     if not ((values >= 0) & (values < 1)).all():
         raise ValueError("argument 'albedo' has values that are not in [0, 1); allowed: 0 or more and below 1")
     return np.ascontiguousarray(np.broadcast_to(values if values.ndim == 3 else values[..., None], shape), np.float32)
+
+
+def gathered(light: tuple[NDArray, NDArray]) -> tuple[NDArray, NDArray]:
+    """Irradiance (H, W, 3) and directions of means of texels, at least `GATHERED_TEXELS` along the longer side."""
+    irradiance, way = light
+    height, width = irradiance.shape[:2]
+    for count in (8, 4, 2):
+        if height % count == 0 == width % count and max(height, width) >= count * GATHERED_TEXELS:
+            irradiance, way = (_means(values, count) if values.ndim == 3 else values for values in light)
+            return irradiance, way / np.linalg.norm(way, axis=-1, keepdims=True)
+    return light
+
+
+def _means(values: NDArray, count: int) -> NDArray:
+    """Means of values (H, W, C) over `count` x `count` texels."""
+    height, width, channels = values.shape
+    return values.reshape(height // count, count, width // count, count, channels).mean(axis=(1, 3))
 
 
 def continued(values: NDArray, known: NDArray) -> NDArray:
@@ -143,6 +166,7 @@ class TexturedPlane:
     albedo, factor : float32 (H, W, 3); the second is the convention's.
     mean_albedo : the convention's, of each channel.
     mean_free_path : of each channel, in the unit of `pitch`.
+    coverage : fraction of each texel that light enters, float32 (H, W); None: 1.
     """
 
     sources: Sequence[native.LdfLibrary]
@@ -151,6 +175,7 @@ class TexturedPlane:
     mean_albedo: Sequence[float]
     mean_free_path: Sequence[float]
     pitch: Sequence[float]
+    coverage: NDArray[np.float32] | None = None
 
     def correct(
         self,
@@ -164,25 +189,30 @@ class TexturedPlane:
     ) -> float:
         """Correct the convention's luminance (H, W, 3) in place; the estimated noise, as `NOISE`."""
         worst = 0.0
+        is_covered = self.coverage is None or bool((self.coverage == 1).all())
+        albedo, factor = (np.ascontiguousarray(values, np.float32) for values in (self.albedo, self.factor))
         for c, part in enumerate(progress.split([1.0] * 3)):
             like = [before for before in range(c) if self._is_like(before, c, beams)]
             if like:
                 luminance[..., c] = luminance[..., like[0]]
             if like or self._is_even(c) or not beams:
                 continue
-            luminance[..., c], error, _ = native.textured(
+            _, error, _ = native.textured(
                 self.sources[c].medium,
                 tuple(self.mean_free_path[c] / np.asarray(self.pitch)),
-                np.ascontiguousarray(self.albedo[..., c]),
-                np.ascontiguousarray(self.factor[..., c]),
+                albedo,
+                factor,
                 self.mean_albedo[c],
-                np.ascontiguousarray(luminance[..., c]),
-                [(np.ascontiguousarray(light[..., c]), way) for light, way in beams],
+                luminance,
+                beams,
                 side,
                 noise,
                 round(max_walks * self._shortness(c)),
                 threads=threads,
                 progress=part,
+                channel=c,
+                coverage=None if is_covered else self.coverage,
+                result=luminance,
             )
             worst = max(worst, error)
         return worst

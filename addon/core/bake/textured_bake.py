@@ -13,6 +13,7 @@ from ..material import Material
 from ..messages import Message, note
 from ..progress import Progress
 from ..scene.bent_grid import AnyGrid, BentGrid
+from ..scene.sampling import resized
 from .bake_settings import DIRECTION, IRRADIANCE, BakeSettings
 from .beams import arriving_beams
 from .bent_textured import ratio_on_planes
@@ -58,39 +59,49 @@ def with_factors(grids: Sequence[AnyGrid], material: Material, sources: Sequence
         channels.append(_channel(grids, c, table))
     changed = []
     for number, grid in enumerate(grids):
-        albedo = np.stack([albedos[number] for albedos, _ in channels], -1).astype(np.float32)
+        albedo = grid.albedo if _is_known(grid) else np.stack([albedos[number] for albedos, _ in channels], -1)
         factor = np.stack([convention.factors[number] for _, convention in channels], -1)
         changed.append(replace(grid, albedo=albedo, base_color=None, color_in=factor, color_out=factor))
     return changed, replace(material, albedo=tuple(convention.albedo for _, convention in channels))
 
 
-def _channel(grids: Sequence[AnyGrid], c: int, table: ReflectanceTable) -> tuple[list[NDArray], Convention]:
-    """Albedos (H, W) of each grid in a channel, and the convention of all."""
-    albedos, reflectances = [], []
-    for grid in grids:
+def _is_known(grid: AnyGrid) -> bool:
+    """True if all texels have an albedo."""
+    return grid.albedo is not None and bool((grid.coverage > 0).all())
+
+
+def _channel(grids: Sequence[AnyGrid], c: int, table: ReflectanceTable) -> tuple[dict[int, NDArray], Convention]:
+    """Albedos (H, W) in a channel of the grids, by number, that do not know all; and the convention of all grids."""
+    albedos, reflectances = {}, []
+    for number, grid in enumerate(grids):
         values = continued((grid.base_color if grid.albedo is None else grid.albedo)[..., c], grid.coverage > 0)
-        albedos.append(table.albedo(values) if grid.albedo is None else values)
+        if not _is_known(grid):
+            albedos[number] = np.float32(table.albedo(values) if grid.albedo is None else values)
         reflectances.append(np.clip(values, *table.ends) if grid.albedo is None else table.reflectance(values))
     return albedos, Convention.of(reflectances, table, [grid.weights for grid in grids])
 
 
 def corrected(side: str, grid: AnyGrid, luminance: NDArray, spreading: Spreading, progress: Progress) -> NDArray:
-    """Luminance (H, W, 3) of light on one side of a grid as its texels scatter it, from that of the convention."""
+    """Luminance (H, W, 3) of light on one side of a grid as its texels scatter it, from that of the convention.
+
+    The array of the latter may be that of the result.
+    """
     if isinstance(grid, BentGrid):
         return luminance * ratio_on_planes(side, grid, luminance, spreading, progress)
     effort, settings, material = spreading.effort.of_plane(grid.texels), spreading.settings, spreading.material
     beams = arriving_beams(grid, spreading.illumination, settings, effort)
-    beams = [(light * grid.coverage[..., None], way) for light, way in beams]
+    albedo, factor, result, coverage = grid.albedo, grid.color_in, luminance, grid.coverage
     pad = _mirrored_texels(grid)
-    rows, columns = (slice(count, -count or None) for count in pad)
-    arrays = [_mirrored(values, pad) for values in (grid.albedo, grid.color_in, luminance)]
-    albedo, factor, result = arrays
+    if any(pad):
+        whole = [(resized(light, grid.height, grid.width, is_smooth=False), way) for light, way in beams]
+        beams = _mirrored_beams(whole, pad)
+        albedo, factor, result, coverage = (_mirrored(values, pad) for values in (albedo, factor, result, coverage))
     pitch = grid.pitch_x, grid.pitch_y
-    plane = TexturedPlane(spreading.sources, albedo, factor, material.albedo, material.mean_free_path, pitch)
-    beams = _mirrored_beams(beams, pad)
+    plane = TexturedPlane(spreading.sources, albedo, factor, material.albedo, material.mean_free_path, pitch, coverage)
     noise = plane.correct(result, beams, side, effort.noise, effort.max_walks, settings.threads, progress)
     if spreading.reports.texture:
         spreading.reports.texture(noise)
+    rows, columns = (slice(count, -count or None) for count in pad)
     return np.ascontiguousarray(result[rows, columns])
 
 
@@ -100,9 +111,9 @@ def _mirrored_texels(grid: AnyGrid) -> tuple[int, int]:
 
 
 def _mirrored(values: NDArray, pad: tuple[int, int]) -> NDArray:
-    """A copy of values (H, W, 3) with mirror images beyond the borders."""
+    """A copy of values (H, W) or (H, W, 3) with mirror images beyond the borders."""
     rows, columns = pad
-    return np.pad(values, ((rows, rows), (columns, columns), (0, 0)), mode="symmetric")
+    return np.pad(values, ((rows, rows), (columns, columns), (0, 0))[: values.ndim], mode="symmetric")
 
 
 def _mirrored_beams(beams: Beams, pad: tuple[int, int]) -> Beams:

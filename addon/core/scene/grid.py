@@ -126,7 +126,16 @@ class Grid:
 
     def coarse(self, texels: int) -> Grid:
         """The grid with at most so many texels along a side, without colors."""
-        width, height = min(self.width, texels), min(self.height, texels)
+        return self._of_size(min(self.width, texels), min(self.height, texels))
+
+    def gathering(self, texels: int) -> Grid:
+        """As `coarse`, but where possible each of its texels stands for as many of this grid's along both axes."""
+        for count in (1, 2, 4, 8):
+            if self.width % count == 0 == self.height % count and max(self.width, self.height) <= count * texels:
+                return self._of_size(self.width // count, self.height // count)
+        return self.coarse(texels)
+
+    def _of_size(self, width: int, height: int) -> Grid:
         pitch = {"pitch_x": self.pitch_x * self.width / width, "pitch_y": self.pitch_y * self.height / height}
         whole = np.ones((height, width), np.float32)
         without = dict.fromkeys(("color_in", "color_out", "base_color", "albedo"))

@@ -40,11 +40,13 @@ void add_path_products(const PlacedPaths& paths, std::size_t count, float scale,
         std::array<Row, tile_rows> product;
 #pragma GCC unroll 16
         for (std::size_t r = 0; r < tile_rows; ++r) {
-            const std::ptrdiff_t at = *place + static_cast<std::ptrdiff_t>(r) * stride;
-            std::memcpy(&product[r], planes.light + at, sizeof(Row));
+            const std::ptrdiff_t row = static_cast<std::ptrdiff_t>(r) * stride;
+            std::memcpy(&product[r], planes.light + paths.light[p] + row, sizeof(Row));
             product[r] *= scale;
+            if (planes.coverage != nullptr)
+                multiply(product[r], planes.coverage + *place + row);
             Row plain_product = product[r];
-            multiply(plain_product, planes.entering + at);
+            multiply(plain_product, planes.entering + *place + row);
             plain_sum[r] += weight * plain_product;
         }
         while (++place < end) {

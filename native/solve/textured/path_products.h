@@ -14,8 +14,9 @@ inline constexpr std::size_t tile_columns = 16;
 inline constexpr std::size_t tile_texels = tile_rows * tile_columns;
 
 // Paths whose places are offsets of values in the planes of a sublattice: `places` of path p begin at first[p] and are the
-// entry, then the scatterings.
+// entry, then the scatterings. The light has planes of its own.
 struct PlacedPaths {
+    std::span<const std::ptrdiff_t> light;  // [path], the entry in its planes
     std::span<const std::ptrdiff_t> places;
     std::span<const std::size_t> first;
     std::span<const float> weight;  // [path] of the plain sum
@@ -24,14 +25,15 @@ struct PlacedPaths {
 // Planes at the first texel of a tile.
 struct TilePlanes {
     const float* light;
+    const float* coverage;  // nullptr: 1
     const float* entering;
     const float* albedo;
     std::ptrdiff_t stride;  // from a row to the next
 };
 
 // For the texels i of a tile, over the first `count` paths; sums are stored row by row:
-//   textured[i] += scale * light[entry + i] * product of the albedos at the scatterings
-//   plain[i] += scale * weight * light[entry + i] * entering[entry + i]
+//   textured[i] += scale * light[entry + i] * coverage[entry + i] * product of the albedos at the scatterings
+//   plain[i] += scale * weight * light[entry + i] * coverage[entry + i] * entering[entry + i]
 void add_path_products(const PlacedPaths& paths, std::size_t count, float scale, const TilePlanes& planes,
                        float* textured, float* plain);
 

@@ -53,7 +53,7 @@ void divide_rows(float* __restrict ratio, const float* textured, const float* pl
     }
 }
 
-void add_rows(float* __restrict sum, const float* a, const float* b, std::size_t count)
+void add_rows(float* sum, const float* a, const float* b, std::size_t count)
 {
     for (std::size_t i = 0; i < count; ++i)
         sum[i] = a[i] + b[i];

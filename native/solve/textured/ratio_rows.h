@@ -12,7 +12,7 @@ void sum_rows(float* sum, std::span<const float* const> rows, std::span<const fl
 // ratio[i] = textured[i] / plain[i] where that is above 0, else otherwise[i]
 void divide_rows(float* ratio, const float* textured, const float* plain, const float* otherwise, std::size_t count);
 
-// sum[i] = a[i] + b[i]
+// sum[i] = a[i] + b[i]; the sum may be one of them.
 void add_rows(float* sum, const float* a, const float* b, std::size_t count);
 
 // A row of the ratios of both halves.

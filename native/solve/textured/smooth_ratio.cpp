@@ -108,10 +108,13 @@ struct Blocks {
     std::size_t height;
 };
 
-// Mean squared errors of the texels of each block at one width, in units of the luminance.
+// Means over the texels of each block at one width, in units of the squared luminance.
 struct Errors {
-    Map cost;      // blur and noise; may be negative by chance
-    Map variance;  // noise alone
+    explicit Errors(std::size_t blocks) : cost(blocks), variance(blocks), power(blocks) {}
+
+    Map cost;      // error by blur and noise; may be negative by chance
+    Map variance;  // error by noise alone
+    Map power;     // of the luminance itself
 };
 
 // Sums of both halves in a row.
@@ -137,31 +140,27 @@ struct SumsRow {
     Map one;
 };
 
-// Ratios of both halves together, and their errors, at some widths of which the first is 0.
-struct Smoothed {
-    std::vector<Map> ratios;
-    std::vector<Errors> errors;
-};
-
-Smoothed smoothed_ratios(const PathSums& sums, const View2D<const float>& scale, std::span<const double> sigmas)
+// Errors at some widths of which the first is 0.
+std::vector<Errors> errors_at(const PathSums& sums, std::size_t width, const ScaleRow& scale,
+                              std::span<const double> sigmas)
 {
-    const std::size_t width = scale.width, height = scale.height;
+    const std::size_t height = sums.plain[0].size() / width;
     const Blocks blocks(width, height);
     const std::vector<Gaussian> gaussians(sigmas.begin(), sigmas.end());
-    Smoothed result;
-    for (std::size_t k = 0; k < sigmas.size(); ++k) {
-        result.ratios.emplace_back(width * height);
-        result.errors.push_back({Map(blocks.count()), Map(blocks.count())});
-    }
+    std::vector<Errors> result(sigmas.size(), Errors(blocks.count()));
     parallel_for(blocks.height, [&](std::size_t block_row) {
         const std::size_t first = block_row * block_side, rows = std::min(block_side, height - first);
         SumsRow row(width);
         const std::array<Map, 2> empty{Map(width), Map(width)};
         std::vector<std::array<Map, 2>> fine(rows, empty);
+        std::vector<Map> scales(rows, Map(width));
+        for (std::size_t r = 0; r < rows; ++r)
+            scale(first + r, scales[r].data());
         std::array<Map, 2> smooth = empty;
+        Map both(width);
         for (std::size_t k = 0; k < sigmas.size(); ++k) {
             RowSmoother smoother(gaussians[k], width, height);
-            Map cost(width), variance(width);
+            Map cost(width), variance(width), power(width);
             for (std::size_t r = 0; r < rows; ++r) {
                 const std::size_t y = first + r;
                 for (std::size_t h = 0; h < 2; ++h) {
@@ -169,9 +168,13 @@ Smoothed smoothed_ratios(const PathSums& sums, const View2D<const float>& scale,
                     smoother(sums.plain[h].data(), y, row.plain[h].data());
                 }
                 std::array<Map, 2>& now = k == 0 ? fine[r] : smooth;
-                row.divide(now, result.ratios[k].data() + y * width);
+                row.divide(now, both.data());
                 add_errors(cost.data(), variance.data(), {now[0].data(), now[1].data()},
-                           {fine[r][0].data(), fine[r][1].data()}, scale.row(y), width);
+                           {fine[r][0].data(), fine[r][1].data()}, scales[r].data(), width);
+                for (std::size_t x = 0; x < width; ++x) {
+                    const float luminance = scales[r][x] * both[x];
+                    power[x] += luminance * luminance;
+                }
             }
             for (std::size_t column = 0; column < blocks.width; ++column) {
                 const std::size_t begin = column * block_side, end = std::min(begin + block_side, width);
@@ -179,22 +182,19 @@ Smoothed smoothed_ratios(const PathSums& sums, const View2D<const float>& scale,
                 const auto mean = [&](const Map& values) {
                     return std::accumulate(values.data() + begin, values.data() + end, 0.0f) / texels;
                 };
-                result.errors[k].cost[block_row * blocks.width + column] = mean(cost);
-                result.errors[k].variance[block_row * blocks.width + column] = mean(variance);
+                const std::size_t block = block_row * blocks.width + column;
+                result[k].cost[block] = mean(cost);
+                result[k].variance[block] = mean(variance);
+                result[k].power[block] = mean(power);
             }
         }
     });
     const Gaussian around(choice_width);
-    for (Errors& errors : result.errors) {
+    for (Errors& errors : result) {
         errors.cost = smoothed(errors.cost, around, blocks.width, blocks.height);
         errors.variance = smoothed(errors.variance, around, blocks.width, blocks.height);
     }
     return result;
-}
-
-double square(double value)
-{
-    return value * value;
 }
 
 // Weight of the right one of two neighbors at a texel, and the left one, along one axis.
@@ -214,56 +214,87 @@ Between between_blocks(std::size_t texel, std::size_t blocks)
 
 }  // namespace
 
-double smooth_ratio(const PathSums& sums, const View2D<const float>& scale, std::vector<float>& ratio)
+SmoothingChoice choose_smoothing(const PathSums& sums, std::size_t width, const ScaleRow& scale)
 {
-    const std::size_t width = scale.width, height = scale.height;
-    const Blocks blocks(width, height);
-    const Smoothed candidates = smoothed_ratios(sums, scale, widths);
-    std::vector<std::uint8_t> choice(blocks.count());
+    const Blocks blocks(width, sums.plain[0].size() / width);
+    const std::vector<Errors> errors = errors_at(sums, width, scale, widths);
+    SmoothingChoice result{std::vector<std::uint8_t>(blocks.count()), 0.0};
     const std::size_t regions = (blocks.width + region_side - 1) / region_side;
     std::vector<double> costs((blocks.height + region_side - 1) / region_side * regions), variances(costs.size());
+    double power = 0.0;
     for (std::size_t b = 0; b < blocks.count(); ++b) {
         std::size_t best = 0;
         for (std::size_t k = 1; k < widths.size(); ++k)
-            if (candidates.errors[k].cost[b] < candidates.errors[best].cost[b])
+            if (errors[k].cost[b] < errors[best].cost[b])
                 best = k;
-        choice[b] = static_cast<std::uint8_t>(best);
+        result.width[b] = static_cast<std::uint8_t>(best);
         const std::size_t region = b / blocks.width / region_side * regions + b % blocks.width / region_side;
-        costs[region] += static_cast<double>(candidates.errors[best].cost[b]);
-        variances[region] += static_cast<double>(candidates.errors[best].variance[b]);
+        costs[region] += static_cast<double>(errors[best].cost[b]);
+        variances[region] += static_cast<double>(errors[best].variance[b]);
+        power += static_cast<double>(errors[best].power[b]);
     }
     // The noise of the costs would count as an error if the larger one of a block's two did.
     double error = 0.0;
     for (std::size_t r = 0; r < costs.size(); ++r)
         error += std::max(costs[r], variances[r]);
-    ratio.resize(width * height);
-    std::vector<double> row_sums(height);
+    result.error = power > 0.0 ? std::sqrt(error / power) : 0.0;
+    return result;
+}
+
+void smooth_ratio(PathSums sums, std::size_t width, const SmoothingChoice& choice,
+                  const std::function<void(std::size_t y, const float* ratio)>& take)
+{
+    const std::size_t height = sums.plain[0].size() / width;
+    const Blocks blocks(width, height);
+    for (std::array<Map, 2>* halves : {&sums.textured, &sums.plain}) {
+        auto& [both, other] = *halves;
+        parallel_for(height, [&](std::size_t y) {
+            float* const row = both.data() + y * width;
+            add_rows(row, row, other.data() + y * width, width);
+        });
+        Map().swap(other);
+    }
+    const std::vector<Gaussian> gaussians(widths.begin(), widths.end());
     std::vector<Between> columns;
     for (std::size_t x = 0; x < width; ++x)
         columns.push_back(between_blocks(x, blocks.width));
-    parallel_for(height, [&](std::size_t y) {
-        const Between up = between_blocks(y, blocks.height);
-        for (std::size_t x = 0; x < width; ++x) {
-            const Between& across = columns[x];
-            const std::size_t i = y * width + x;
-            const auto at = [&](std::size_t row, std::size_t column) {
-                return candidates.ratios[choice[row * blocks.width + column]][i];
-            };
-            const float below = std::lerp(at(up.left, across.left), at(up.left, across.right), across.weight);
-            const float above = std::lerp(at(up.right, across.left), at(up.right, across.right), across.weight);
-            ratio[i] = std::lerp(below, above, up.weight);
-            row_sums[y] += square(static_cast<double>(scale(y, x)) * static_cast<double>(ratio[i]));
+    parallel_for(blocks.height, [&](std::size_t block_row) {
+        std::array<Map, widths.size()> ratios;
+        Map textured(width), plain(width), ratio(width);
+        const Map one(width, 1.0f);
+        const std::size_t end = std::min((block_row + 1) * block_side, height);
+        for (std::size_t y = block_row * block_side; y < end; ++y) {
+            const Between up = between_blocks(y, blocks.height);
+            const std::uint8_t* const below = choice.width.data() + up.left * blocks.width;
+            const std::uint8_t* const above = choice.width.data() + up.right * blocks.width;
+            for (std::size_t k = 0; k < widths.size(); ++k) {
+                const auto is_k = [&](std::uint8_t chosen) { return chosen == k; };
+                if (std::none_of(below, below + blocks.width, is_k) && std::none_of(above, above + blocks.width, is_k))
+                    continue;
+                RowSmoother smoother(gaussians[k], width, height);
+                smoother(sums.textured[0].data(), y, textured.data());
+                smoother(sums.plain[0].data(), y, plain.data());
+                ratios[k].resize(width);
+                divide_rows(ratios[k].data(), textured.data(), plain.data(), one.data(), width);
+            }
+            for (std::size_t x = 0; x < width; ++x) {
+                const Between& across = columns[x];
+                const auto at = [&](const std::uint8_t* blocks_of_row, std::size_t column) {
+                    return ratios[blocks_of_row[column]][x];
+                };
+                ratio[x] =
+                    std::lerp(std::lerp(at(below, across.left), at(below, across.right), across.weight),
+                              std::lerp(at(above, across.left), at(above, across.right), across.weight), up.weight);
+            }
+            take(y, ratio.data());
         }
     });
-    const double power = std::accumulate(row_sums.begin(), row_sums.end(), 0.0) / static_cast<double>(width * height);
-    return power > 0.0 ? std::sqrt(error / static_cast<double>(blocks.count()) / power) : 0.0;
 }
 
-double cost_of_smoothing(const PathSums& sums, const View2D<const float>& scale)
+double cost_of_smoothing(const PathSums& sums, std::size_t width, const ScaleRow& scale)
 {
     const std::array<double, 2> sigmas{0.0, compared_width};
-    const Smoothed candidates = smoothed_ratios(sums, scale, sigmas);
-    const Map& cost = candidates.errors[1].cost;
+    const Map cost = errors_at(sums, width, scale, sigmas)[1].cost;
     return std::accumulate(cost.begin(), cost.end(), 0.0) / static_cast<double>(cost.size());
 }
 

@@ -3,9 +3,9 @@
 
 #include <array>
 #include <cstddef>
+#include <cstdint>
+#include <functional>
 #include <vector>
-
-#include "base/view.h"
 
 namespace beamspread {
 
@@ -15,13 +15,24 @@ struct PathSums {
     std::array<std::vector<float>, 2> plain;
 };
 
-// Writes the ratio textured / plain of each texel. `scale`: what it is multiplied by later, rows contiguous; errors count
-// in its units. Returns the estimated root mean square error of ratio x scale, over the root mean square of that: errors
-// count where the light is, also where it is a spot.
-double smooth_ratio(const PathSums& sums, const View2D<const float>& scale, std::vector<float>& ratio);
+// Writes a row of the factors that a ratio is multiplied by later, in whose units errors count.
+using ScaleRow = std::function<void(std::size_t y, float* values)>;
+
+// Gaussians by which the ratio of the sums is smoothed, one for each block of texels, and the error that they leave.
+struct SmoothingChoice {
+    std::vector<std::uint8_t> width;  // [block], index of a width
+    double error = 0.0;  // estimated root mean square of ratio x scale, over the root mean square of that
+};
+
+// Errors count where the light is, also where it is a spot.
+SmoothingChoice choose_smoothing(const PathSums& sums, std::size_t width, const ScaleRow& scale);
+
+// Calls take(y, ratio of the texels in row y) for each row, in any order, with the ratio textured / plain.
+void smooth_ratio(PathSums sums, std::size_t width, const SmoothingChoice& choice,
+                  const std::function<void(std::size_t y, const float* ratio)>& take);
 
 // Estimated mean squared error of ratio x scale if all texels are smoothed by one Gaussian: without choices, which favor
 // errors that are too low by chance.
-double cost_of_smoothing(const PathSums& sums, const View2D<const float>& scale);
+double cost_of_smoothing(const PathSums& sums, std::size_t width, const ScaleRow& scale);
 
 }  // namespace beamspread

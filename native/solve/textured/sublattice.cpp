@@ -2,6 +2,8 @@
 
 #include <algorithm>
 
+#include "solve/textured/nearest_texels.h"
+
 namespace beamspread {
 
 namespace {
@@ -33,12 +35,21 @@ bool Sublattices::is_within(const PathPlace& place) const
     return std::abs(place.x) <= reach && std::abs(place.y) <= reach;
 }
 
-std::ptrdiff_t Sublattices::offset(std::size_t sublattice, const PathPlace& place) const
+std::size_t Sublattices::texels_of(const View2D<const float>& map) const
 {
-    const auto side = static_cast<std::ptrdiff_t>(m_side);
+    for (std::size_t texels = m_side; texels > 1; --texels)
+        if (m_side % texels == 0 && map.width * texels == m_width && map.height * texels == m_height)
+            return texels;
+    return 1;
+}
+
+std::ptrdiff_t Sublattices::offset(std::size_t sublattice, const PathPlace& place, std::size_t texels) const
+{
+    const auto of_map = static_cast<std::ptrdiff_t>(texels), side = static_cast<std::ptrdiff_t>(m_side / texels);
     const auto reach = static_cast<std::int32_t>(m_reach);
-    const std::ptrdiff_t x = static_cast<std::ptrdiff_t>(sublattice % m_side) + std::clamp(place.x, -reach, reach);
-    const std::ptrdiff_t y = static_cast<std::ptrdiff_t>(sublattice / m_side) + std::clamp(place.y, -reach, reach);
+    const std::ptrdiff_t right = static_cast<std::ptrdiff_t>(sublattice % m_side) + std::clamp(place.x, -reach, reach);
+    const std::ptrdiff_t far = static_cast<std::ptrdiff_t>(sublattice / m_side) + std::clamp(place.y, -reach, reach);
+    const std::ptrdiff_t x = floor_div(right, of_map), y = floor_div(far, of_map);
     const std::ptrdiff_t across = floor_div(x, side), up = floor_div(y, side);
     const auto row = static_cast<std::ptrdiff_t>(stride());
     const auto plane = row * static_cast<std::ptrdiff_t>(m_tiles_down * tile_rows + 2 * m_border);
@@ -47,11 +58,14 @@ std::ptrdiff_t Sublattices::offset(std::size_t sublattice, const PathPlace& plac
 
 AlignedVector<float> Sublattices::dealt(const View2D<const float>& values, float factor, bool goes_on) const
 {
-    const std::size_t columns = stride(), rows = m_tiles_down * tile_rows + 2 * m_border;
-    AlignedVector<float> plane(count() * rows * columns);
-    const auto side = static_cast<std::ptrdiff_t>(m_side), border = static_cast<std::ptrdiff_t>(m_border);
-    const auto width = static_cast<std::ptrdiff_t>(m_width), height = static_cast<std::ptrdiff_t>(m_height);
-    parallel_for(count() * rows, [&](std::size_t task) {
+    const std::size_t texels = texels_of(values), columns = stride(), rows = m_tiles_down * tile_rows + 2 * m_border;
+    const std::size_t all = m_side / texels * (m_side / texels);
+    AlignedVector<float> plane(all * rows * columns);
+    const NearestTexels map(values, m_height / texels, m_width / texels);
+    const auto side = static_cast<std::ptrdiff_t>(m_side / texels), border = static_cast<std::ptrdiff_t>(m_border);
+    const auto width = static_cast<std::ptrdiff_t>(m_width / texels);
+    const auto height = static_cast<std::ptrdiff_t>(m_height / texels);
+    parallel_for(all * rows, [&](std::size_t task) {
         const auto sublattice = static_cast<std::ptrdiff_t>(task / rows);
         const std::ptrdiff_t y = (static_cast<std::ptrdiff_t>(task % rows) - border) * side + sublattice / side;
         if (!goes_on && (y < 0 || y >= height))
@@ -62,7 +76,7 @@ AlignedVector<float> Sublattices::dealt(const View2D<const float>& values, float
             const std::ptrdiff_t x = (static_cast<std::ptrdiff_t>(column) - border) * side + sublattice % side;
             if (goes_on || (x >= 0 && x < width))
                 filled[column] =
-                    factor * values(row, static_cast<std::size_t>(std::clamp<std::ptrdiff_t>(x, 0, width - 1)));
+                    factor * map(row, static_cast<std::size_t>(std::clamp<std::ptrdiff_t>(x, 0, width - 1)));
         }
     });
     return plane;

@@ -33,11 +33,17 @@ public:
     // Texels from a row of a plane to the next.
     std::size_t stride() const { return m_tiles_across * tile_columns + 2 * m_border; }
 
-    // The index of a place, less that of the tile of texels that light leaves, which are of this sublattice.
-    std::ptrdiff_t offset(std::size_t sublattice, const PathPlace& place) const;
+    // Texels along each axis that show one texel of a map of this size: a divisor of `side`, or 1 if the map's texels are
+    // no such squares.
+    std::size_t texels_of(const View2D<const float>& map) const;
+
+    // The index of a place, less that of the tile of texels that light leaves, which are of this sublattice. In planes
+    // of maps whose texels are shown by `texels` of the plane's along each axis.
+    std::ptrdiff_t offset(std::size_t sublattice, const PathPlace& place, std::size_t texels = 1) const;
     bool is_within(const PathPlace& place) const;
 
-    // A plane of these sublattices. Beyond the border values continue, or they are 0.
+    // A plane of these sublattices, or of those that `texels_of` a coarser map need. Beyond the border values continue,
+    // or they are 0. Maps of other sizes show the nearest texels.
     AlignedVector<float> dealt(const View2D<const float>& values, float factor, bool goes_on) const;
 
     // Calls set(y, x, index in the tiles of this sublattice, one after the other) for each texel.

@@ -116,10 +116,14 @@ public:
                         reach_of(m_plans, fineness.reach_walks, problem.seed)),
           m_albedo(m_sublattices.dealt(problem.albedo, static_cast<float>(1.0 / m_survival), true)),
           m_entering(m_sublattices.dealt(problem.factor, 1.0f, false)),
+          m_coverage(problem.coverage.data ? m_sublattices.dealt(problem.coverage, 1.0f, false)
+                                           : AlignedVector<float>()),
           m_shares(irradiances_of(problem), m_sublattices)
     {
-        for (const TexturedLight& light : problem.lights)
+        for (const TexturedLight& light : problem.lights) {
             m_light.push_back(m_sublattices.dealt(light.irradiance, 1.0f, false));
+            m_light_texels.push_back(m_sublattices.texels_of(light.irradiance));
+        }
         for (std::size_t h = 0; h < 2; ++h) {
             m_sums.textured[h].resize(texels());
             m_sums.plain[h].resize(texels());
@@ -189,35 +193,59 @@ public:
         return std::sqrt(variance);
     }
 
-    // Writes the ratio of each texel; returns the estimated error.
-    double ratio(std::vector<float>& ratio) const { return smooth_ratio(m_sums, m_problem.convention, ratio); }
-
-    // The same with a power of the factor of light that leaves.
-    double ratio(float power, std::vector<float>& ratio) const
+    // How the ratio is smoothed, and the estimated error.
+    SmoothingChoice choice() const
     {
-        std::vector<std::size_t> rows(m_problem.albedo.height);
-        std::iota(rows.begin(), rows.end(), std::size_t{0});
-        const Leaving leaving(*this, rows, power);
-        const double error = smooth_ratio(leaving.sums, leaving.view(), ratio);
-        std::ranges::transform(ratio, leaving.factor, ratio.begin(), std::divides<>());
-        return error;
+        return choose_smoothing(m_sums, m_problem.albedo.width,
+                                [&](std::size_t y, float* values) { scale_row(y, m_power, values); });
     }
 
-    // The power by which a Gaussian leaves the smallest error.
-    float best_power() const
+    // Frees the planes that paths need; no more can be added.
+    void end_paths()
+    {
+        for (AlignedVector<float>* plane : {&m_albedo, &m_entering, &m_coverage})
+            AlignedVector<float>().swap(*plane);
+        m_light.clear();
+    }
+
+    // Takes the power of the factor of light that leaves by which a Gaussian leaves the smallest error. A sharp factor
+    // times a smooth ratio would draw lines along borders where light hardly follows the factor. True if it is another.
+    bool choose_power()
     {
         const std::vector<std::size_t> few = strips(m_problem.albedo.height);
         double least = std::numeric_limits<double>::infinity();
         float best = 1.0f;
         for (const float power : leaving_powers) {
-            const Leaving leaving(*this, few, power);
-            const double cost = cost_of_smoothing(leaving.sums, leaving.view());
+            const double cost =
+                cost_of_smoothing(sums_at(few, power), m_problem.albedo.width,
+                                  [&](std::size_t y, float* values) { scale_row(few[y], power, values); });
             if (cost < least) {
                 least = cost;
                 best = power;
             }
         }
-        return best;
+        if (best == m_power)
+            return false;
+        m_power = best;
+        const std::size_t width = m_problem.albedo.width;
+        parallel_for(m_problem.albedo.height, [&](std::size_t y) {
+            for (std::size_t x = 0; x < width; ++x)
+                for (std::vector<float>& half : m_sums.textured)
+                    half[y * width + x] *= left(y, x, m_power);
+        });
+        return true;
+    }
+
+    // Writes the luminance; the sums are gone then.
+    void write(const SmoothingChoice& choice, float* luminance, std::size_t stride)
+    {
+        const std::size_t width = m_problem.albedo.width;
+        smooth_ratio(std::move(m_sums), width, choice, [&](std::size_t y, const float* ratio) {
+            std::vector<float> scale(width);
+            scale_row(y, m_power, scale.data());
+            for (std::size_t x = 0; x < width; ++x)
+                luminance[(y * width + x) * stride] = scale[x] * ratio[x];
+        });
     }
 
 private:
@@ -237,40 +265,40 @@ private:
         return rows;
     }
 
-    // Sums and scale at some rows, as they are smoothed: the light that leaves over a power of its factor. A sharp factor
-    // times a smooth ratio would draw lines along borders where light hardly follows the factor.
-    struct Leaving {
-        Leaving(const Textured& all, std::span<const std::size_t> rows, float power)
-            : height(rows.size()), scale(height * all.m_problem.albedo.width), factor(scale.size())
-        {
-            const std::size_t width = all.m_problem.albedo.width;
-            for (std::size_t h = 0; h < 2; ++h) {
-                sums.textured[h].resize(scale.size());
-                sums.plain[h].resize(scale.size());
-            }
-            parallel_for(rows.size(), [&](std::size_t row) {
-                for (std::size_t x = 0; x < width; ++x) {
-                    const std::size_t to = row * width + x, from = rows[row] * width + x;
-                    factor[to] = std::pow(all.m_problem.factor(rows[row], x), 1.0f - power);
-                    scale[to] = all.m_problem.convention(rows[row], x) / factor[to];
-                    for (std::size_t h = 0; h < 2; ++h) {
-                        sums.textured[h][to] = all.m_sums.textured[h][from] * factor[to];
-                        sums.plain[h][to] = all.m_sums.plain[h][from];
-                    }
-                }
-            });
-        }
+    // The convention's factor of light that leaves, over a power of itself.
+    float left(std::size_t y, std::size_t x, float power) const
+    {
+        return power == 1.0f ? 1.0f : std::pow(m_problem.factor(y, x), 1.0f - power);
+    }
 
-        View2D<const float> view() const
-        {
-            return {scale.data(), height, scale.size() / height, static_cast<std::ptrdiff_t>(scale.size() / height)};
-        }
+    // Row of the luminance by the convention over that factor, by which ratios are multiplied.
+    void scale_row(std::size_t y, float power, float* values) const
+    {
+        for (std::size_t x = 0; x < m_problem.albedo.width; ++x)
+            values[x] = m_problem.convention(y, x) / left(y, x, power);
+    }
 
-        std::size_t height;
+    // The sums at some rows, as they are smoothed with this power.
+    PathSums sums_at(const std::vector<std::size_t>& rows, float power) const
+    {
+        const std::size_t width = m_problem.albedo.width;
         PathSums sums;
-        std::vector<float> scale;
-        std::vector<float> factor;  // over the power of itself
-    };
+        for (std::size_t h = 0; h < 2; ++h) {
+            sums.textured[h].resize(rows.size() * width);
+            sums.plain[h].resize(rows.size() * width);
+        }
+        parallel_for(rows.size(), [&](std::size_t row) {
+            for (std::size_t x = 0; x < width; ++x) {
+                const std::size_t to = row * width + x, from = rows[row] * width + x;
+                const float factor = left(rows[row], x, power);
+                for (std::size_t h = 0; h < 2; ++h) {
+                    sums.textured[h][to] = m_sums.textured[h][from] * factor;
+                    sums.plain[h][to] = m_sums.plain[h][from];
+                }
+            }
+        });
+        return sums;
+    }
 
     static std::vector<PathPlan> plans_of(const TexturedProblem& problem, double survival)
     {
@@ -284,13 +312,14 @@ private:
     std::size_t add_products(const SharedPaths& paths, std::size_t walks, std::size_t sublattice, std::size_t light,
                              float* textured, float* plain) const
     {
-        std::vector<std::ptrdiff_t> places;
+        std::vector<std::ptrdiff_t> places, entries;
         std::vector<std::size_t> first{0}, walk;
         std::vector<float> weights;
         for (std::size_t p = 0; p < paths.size(); ++p) {
             const std::size_t begin = paths.first[p], end = paths.first[p + 1];
             if (!m_sublattices.is_within(paths.places[begin]))
                 continue;  // light enters outside of the plane, or too far to matter
+            entries.push_back(m_sublattices.offset(sublattice, paths.places[begin], m_light_texels[light]));
             for (std::size_t k = begin; k < end; ++k)
                 places.push_back(m_sublattices.offset(sublattice, paths.places[k]));
             first.push_back(places.size());
@@ -298,7 +327,7 @@ private:
             weights.push_back(
                 static_cast<float>(std::pow(m_problem.mean_albedo / m_survival, static_cast<double>(end - begin - 1))));
         }
-        const PlacedPaths placed{places, first, weights};
+        const PlacedPaths placed{entries, places, first, weights};
         std::size_t passed = 0;
         for (std::size_t down = 0; down < m_sublattices.tiles_down(); ++down) {
             for (std::size_t across = 0; across < m_sublattices.tiles_across(); ++across) {
@@ -310,8 +339,9 @@ private:
                 const float scale = static_cast<float>(walks) / static_cast<float>(own);
                 const std::size_t at = m_sublattices.tile(down, across);
                 const std::size_t to = (down * m_sublattices.tiles_across() + across) * tile_texels;
-                const TilePlanes planes{m_light[light].data() + at, m_entering.data() + at, m_albedo.data() + at,
-                                        static_cast<std::ptrdiff_t>(m_sublattices.stride())};
+                const float* const coverage = m_coverage.empty() ? nullptr : m_coverage.data() + at;
+                const TilePlanes planes{m_light[light].data() + at, coverage, m_entering.data() + at,
+                                        m_albedo.data() + at, static_cast<std::ptrdiff_t>(m_sublattices.stride())};
                 add_path_products(placed, count, scale, planes, textured + to, plain + to);
                 passed += first[count];
             }
@@ -325,9 +355,12 @@ private:
     Sublattices m_sublattices;
     AlignedVector<float> m_albedo;
     AlignedVector<float> m_entering;  // the convention's factor of light that enters
+    AlignedVector<float> m_coverage;  // empty: 1
     WalkShares m_shares;
     std::vector<AlignedVector<float>> m_light;
+    std::vector<std::size_t> m_light_texels;  // of the plane, that show one of the light's, along each axis
     PathSums m_sums;
+    float m_power = 1.0f;  // of the factor of light that leaves
     std::array<std::vector<Totals>, 2> m_totals;  // [half][sublattice]
     std::uint64_t m_rounds = 0;
     double m_products = 0.0;
@@ -341,9 +374,11 @@ void check(const TexturedProblem& problem)
     };
     if (problem.albedo.height * problem.albedo.width == 0 || differs(problem.factor) || differs(problem.convention))
         reject("albedo", "of another size", "one value for each texel");
+    if (problem.coverage.data != nullptr && differs(problem.coverage))
+        reject("coverage", "of another size", "one value for each texel");
     for (const TexturedLight& light : problem.lights)
-        if (differs(light.irradiance))
-            reject("irradiance", "of another size", "one value for each texel");
+        if (light.irradiance.height * light.irradiance.width == 0)
+            reject("irradiance", "empty", "one value or more");
     for (std::size_t y = 0; y < problem.albedo.height; ++y) {
         for (std::size_t x = 0; x < problem.albedo.width; ++x) {
             const float albedo = problem.albedo(y, x);
@@ -362,8 +397,8 @@ TexturedError solve_textured(const TexturedProblem& problem, Progress& progress,
     check(problem);
     progress.set_total(1.0);
     TexturedError result;
-    std::vector<float> ratio;
     with_threads(problem.threads, [&] {
+        SmoothingChoice choice;
         Textured textured(problem, problem.max_walks > unit ? fine : coarse);
         std::size_t units = std::clamp<std::size_t>(problem.max_walks / unit, 1, first_units);
         double left = 1.0;
@@ -373,7 +408,8 @@ TexturedError solve_textured(const TexturedProblem& problem, Progress& progress,
             left -= share;
             textured.add(units, [&](double part) { progress.advance(share * part); });
             result.walks += units * unit;
-            result.error = textured.ratio(ratio);
+            choice = textured.choice();
+            result.error = choice.error;
             const auto walks = static_cast<double>(result.walks);
             const double excess = std::max(result.error, textured.total_error() / total_part) / problem.tolerance;
             const double wanted = walks * excess * excess;
@@ -386,17 +422,14 @@ TexturedError solve_textured(const TexturedProblem& problem, Progress& progress,
             units = std::min(static_cast<std::size_t>(more), max_growth * (result.walks / unit));
         }
         // While more paths may follow the factor stays as it is: few paths do not show what another one blurs.
-        if (result.error > problem.tolerance)
-            if (const float power = textured.best_power(); power != 1.0f)
-                result.error = textured.ratio(power, ratio);
+        textured.end_paths();
+        if (result.error > problem.tolerance && textured.choose_power()) {
+            choice = textured.choice();
+            result.error = choice.error;
+        }
+        textured.write(choice, luminance, stride);
     });
     progress.finish();
-    for (std::size_t y = 0; y < problem.albedo.height; ++y) {
-        for (std::size_t x = 0; x < problem.albedo.width; ++x) {
-            const std::size_t i = y * problem.albedo.width + x;
-            luminance[i * stride] = problem.convention(y, x) * ratio[i];
-        }
-    }
     return result;
 }
 

@@ -19,7 +19,7 @@ namespace beamspread {
 
 // Light of about one direction.
 struct TexturedLight {
-    View2D<const float> irradiance;  // W/m^2
+    View2D<const float> irradiance;  // W/m^2; of any size, texels show the nearest value
     Vec3 travel{0.0, 0.0, -1.0};  // unit vector in the frame of the plane, z < 0
 };
 
@@ -32,6 +32,7 @@ struct TexturedProblem {
     double mean_albedo = 0.0;  // the convention's
     View2D<const float> convention;  // luminance by the convention
     std::vector<TexturedLight> lights;
+    View2D<const float> coverage{};  // fraction of each texel that light enters; without data: 1
     bool is_through = false;  // light leaves through the far face of a slab
     double tolerance = 0.01;  // wanted error of texels, root mean square, over that of the luminance
     std::size_t max_walks = 4096;  // for each texel
@@ -45,8 +46,8 @@ struct TexturedError {
     std::size_t walks = 0;
 };
 
-// Writes the luminance (height, width), with `stride` elements from one texel to the next. The result does not depend on
-// the number of threads. Throws InvalidArgument, Cancelled.
+// Writes the luminance (height, width), with `stride` elements from one texel to the next; it may be the convention's.
+// The result does not depend on the number of threads. Throws InvalidArgument, Cancelled.
 TexturedError solve_textured(const TexturedProblem& problem, Progress& progress, float* luminance, std::size_t stride);
 
 }  // namespace beamspread

@@ -5,6 +5,7 @@
 #include <numeric>
 
 #include "base/threads.h"
+#include "solve/textured/nearest_texels.h"
 
 namespace beamspread {
 
@@ -36,12 +37,13 @@ std::vector<double> power_of_tiles(const View2D<const float>& light, const Subla
 {
     const std::size_t rows = sublattices.side() * tile_rows, columns = sublattices.side() * tile_columns;
     std::vector<double> powers(sublattices.tile_count());
+    const NearestTexels shown(light, sublattices.height(), sublattices.width());
     parallel_for(sublattices.tiles_down(), [&](std::size_t down) {
-        std::vector<double> sums(light.width);
-        for (std::size_t y = down * rows; y < std::min((down + 1) * rows, light.height); ++y)
-            for (std::size_t x = 0; x < light.width; ++x)
-                sums[x] += static_cast<double>(light(y, x));
-        for (std::size_t x = 0; x < light.width; ++x)
+        std::vector<double> sums(sublattices.width());
+        for (std::size_t y = down * rows; y < std::min((down + 1) * rows, sublattices.height()); ++y)
+            for (std::size_t x = 0; x < sublattices.width(); ++x)
+                sums[x] += static_cast<double>(shown(y, x));
+        for (std::size_t x = 0; x < sublattices.width(); ++x)
             powers[down * sublattices.tiles_across() + x / columns] += sums[x];
     });
     return powers;

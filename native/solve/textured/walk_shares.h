@@ -11,7 +11,7 @@ namespace beamspread {
 
 class WalkShares {
 public:
-    // `lights`: the irradiance of each.
+    // `lights`: the irradiance of each, of any size.
     WalkShares(const std::vector<View2D<const float>>& lights, const Sublattices& sublattices);
 
     // Walks, of `all` in this tile of any sublattice, that belong to a light; 0 if none of it can get there.
