@@ -17,7 +17,7 @@ from beamspread.core.bake.textured_bake import with_factors
 from beamspread.core.material import Material
 from beamspread.core.progress import Progress
 from beamspread.core.scene.illumination import Illumination
-from beamspread.core.scene.lights import PointLight, SunLight, WorldLight
+from beamspread.core.scene.lights import AreaLight, PointLight, SunLight, WorldLight
 
 from bakes import bake, square
 from plain_textured_walk import exitance
@@ -29,13 +29,30 @@ COMMON = "Light", 1.0, (1.0, 1.0, 1.0), True
 ROWS, COLUMNS = np.mgrid[:SIDE, :SIDE]
 VEINS = 0.87 + 0.12 * np.abs(np.sin(0.5 * COLUMNS + 1.3 * np.sin(0.35 * ROWS)) * np.sin(0.3 * ROWS + 0.2 * COLUMNS))
 HEIGHT = 8 * PITCH
+RADIUS, POINTS = 6 * PITCH, 12  # of a lamp with a size
 
 
-def from_lamp():
-    """Directions from a lamp over the middle."""
-    x, y = (COLUMNS + 0.5 - SIDE / 2) * PITCH, (ROWS + 0.5 - SIDE / 2) * PITCH
+def from_lamp(place=(0.0, 0.0)):
+    """Directions from a point above the plane, over the middle unless it has a place there."""
+    x, y = (COLUMNS + 0.5 - SIDE / 2) * PITCH - place[0], (ROWS + 0.5 - SIDE / 2) * PITCH - place[1]
     way = np.stack([x, y, np.full_like(x, -HEIGHT)], -1)
     return way / np.linalg.norm(way, axis=-1, keepdims=True)
+
+
+def from_disk(number):
+    """Directions from a point of a disk over the middle: the points spiral outward, each for as much of its area."""
+    radius, turn = RADIUS * math.sqrt((number + 0.5) / POINTS), number * math.pi * (3 - math.sqrt(5))
+    return from_lamp((radius * math.cos(turn), radius * math.sin(turn)))
+
+
+def even(way):
+    """Weight of a direction among those from all around."""
+    return np.ones(way.shape[:2])
+
+
+def from_flat(way):
+    """Weight of a direction among those from a disk that faces the plane: both cosines over the squared distance."""
+    return way[..., 2] ** 4
 
 
 def from_sky(seed):
@@ -46,13 +63,22 @@ def from_sky(seed):
 
 
 SUN = 0.6, 0.0, -0.8
-# Lights, directions of each part of the count, and the bounds of the L1 distance and of the total.
+UP = tuple(map(tuple, np.eye(3).tolist()))
+# Lights, directions of each part of the count, weights of these, and the bounds of the L1 distance and of the total.
 CASES = {
-    "sun": (SunLight(*COMMON, SUN), [np.array(SUN)], 0.02, 0.005),
-    "lamp": (PointLight(*COMMON, (0.0, 0.0, HEIGHT)), [from_lamp()], 0.02, 0.01),
+    "sun": (SunLight(*COMMON, SUN), [np.broadcast_to(SUN, (SIDE, SIDE, 3))], even, 0.02, 0.005),
+    "lamp": (PointLight(*COMMON, (0.0, 0.0, HEIGHT)), [from_lamp()], even, 0.02, 0.01),
+    "lamp of a size": (
+        AreaLight(*COMMON, (0.0, 0.0, HEIGHT), UP, 2 * RADIUS, 2 * RADIUS, True, math.pi),
+        [*map(from_disk, range(POINTS))],
+        from_flat,
+        0.02,
+        0.01,
+    ),
     "sky": (
-        WorldLight(*COMMON, np.ones((1, 1, 3), np.float32), tuple(map(tuple, np.eye(3).tolist()))),
+        WorldLight(*COMMON, np.ones((1, 1, 3), np.float32), UP),
         [*map(from_sky, range(12))],
+        even,
         0.02,
         0.01,
     ),
@@ -61,16 +87,19 @@ CASES = {
 
 @pytest.mark.parametrize("name", CASES)
 def test_light_agrees_with_a_photon_count(name):
-    """Each half of the count has its own directions of the sky, so that the noise knows them."""
-    light, ways, bound, most = CASES[name]
+    """Each half of the count has its own directions of the sky or disk, so that the noise knows them."""
+    light, ways, weight, bound, most = CASES[name]
     illumination = Illumination([light])
     count = (len(ways) + 1) // 2
-    irradiance = arrive(GRID, illumination, SETTINGS)[0][..., 0] / count
+    irradiance = arrive(GRID, illumination, SETTINGS)[0][..., 0]
     photons, halves = PHOTONS // 2 // count // 100_000 or 1, []
-    for half, own in ((1, ways[:count]), (2, ways[-count:])):
+    for half, own in ((1, ways[::2]), (2, ways[1::2] or ways)):
+        weights = [weight(way) for way in own]
         parts = [
-            exitance(irradiance, way, VEINS, 1.0, G, 100_000 * photons, seed=100 * half + number)[0]
-            for number, way in enumerate(own)
+            exitance(irradiance * part / sum(weights), way, VEINS, 1.0, G, 100_000 * photons, seed=100 * half + number)[
+                0
+            ]
+            for number, (way, part) in enumerate(zip(own, weights, strict=True))
         ]
         halves.append(sum(parts) / math.pi)
     truth, noise = np.mean(halves, axis=0), np.abs(halves[0] - halves[1]).mean() / 2
