@@ -118,7 +118,9 @@ class PlanesImage:
         for part in (plane.part for plane in self.planes):
             if (wanted[part] & ~known[part]).any():
                 image[part] = continued(image[part], known[part])
-        return image
+                known[part] = True
+        # Paths near the end of a surface pass texels between planes.
+        return continued(image, known) if wanted.all() else image
 
     @cached_property
     def _is_surface(self) -> NDArray:
