@@ -19,6 +19,7 @@ from beamspread.core.bake.pace import Estimate, Pace, pace
 from beamspread.core.bake.spread_light import MIN_RAYS
 from beamspread.core.bake.surface import Surface
 from beamspread.core.ldf.library import angles_for
+from beamspread.core.scene.bending import Bending
 from beamspread.core.scene.lights import AreaLight, PointLight, SunLight
 
 from bakes import MATERIAL, SETTINGS, bake_job, square
@@ -233,6 +234,26 @@ def test_bodies_take_longer_the_farther_their_light_spreads(texels, pieces, chan
     one_thread = replace(SETTINGS, threads=1)
     assert cpu / 1.7 < load.seconds(one_thread) < cpu * 1.7
     assert replace(load, path=0.1 * path).seconds(one_thread) < 0.5 * load.seconds(one_thread)
+
+
+@pytest.mark.parametrize(
+    ("texels", "pieces", "bending", "path", "cpu"),
+    [
+        (24_600, 1.0, Bending(1.09, 4.4), 3.5, 4.8),  # a cube
+        (24_600, 1.0, Bending(1.09, 4.4), 10.0, 9.7),
+        (18_700, 1.0, Bending(1.01, 5.0), 10.0, 9.4),  # an icosphere of 80 flat faces
+        (9_520, 1.2, Bending(2.1, 10.8), 3.5, 6.9),  # a torus of 240 flat faces
+        (39_400, 1.3, Bending(4.2, 0.0), 3.5, 17.6),  # a monkey, smooth and flat
+        (39_400, 1.3, Bending(4.2, 19.4), 3.5, 23.0),
+    ],
+)
+def test_bodies_take_longer_the_more_they_bend(texels, pieces, bending, path, cpu):
+    """CPU seconds of whole bakes, relative to those of a ball (an icosphere of 1280 faces) in the same hour."""
+    one_thread = replace(SETTINGS, threads=1)
+    ball = Workload(18_700, is_bent=True, path=3.5)
+    load = replace(ball, texels=texels, pieces=pieces, bending=bending, path=path)
+    longer = load.seconds(one_thread) / ball.seconds(one_thread)
+    assert cpu / 3.6 / 1.7 < longer < cpu / 3.6 * 1.7
 
 
 def test_channels_of_one_medium_share_their_light_under_one_color():

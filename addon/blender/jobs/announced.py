@@ -202,7 +202,7 @@ class _SceneFacts:
         )
         surface = replace(surface, base_color=PLACEHOLDER_COLOR) if is_textured else surface
         scatters = is_textured and target.node.texture_use().is_scattered
-        rest = finders, self.unknown, shape.is_bent, shape.pieces, scatters
+        rest = finders, self.unknown, shape.is_bent, shape.pieces, shape.bending, scatters
         grids = [grid_of_bent(grid, shape) if shape.is_bent else grid]
         rest += 0 if shape.is_bent else shape.planes, min(self._glowing, MAX_GLOWING)
         return Forecast(obj.name, grids, self.lights, self.triangles, surface, *rest)

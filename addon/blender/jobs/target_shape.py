@@ -10,6 +10,7 @@ from mathutils import Vector
 
 from ...core.bake.spread import image_length, spread_over_edges
 from ...core.errors import BakeError
+from ...core.scene.bending import BALL, Bending, bending_of
 from ...core.scene.bent_grid import HOLLOW_SIDE, see_each_other
 from ...core.scene.flat_mesh import bends, check_faces
 from ...core.scene.polygons import Polygons
@@ -39,8 +40,9 @@ class Shape:
     sides : of an image on a surface that bends, scene units; only their ratio counts.
     filled : part of the image that shows the faces.
     pieces : into which a texel is divided where the surface bends, on average.
-    planes : on which the faces of a surface lie that does not bend, about.
     is_hollow : True if parts of a surface that bends see each other.
+    bending : of a surface that bends.
+    planes : on which the faces of a surface lie that does not bend, about.
     error : reason why the target can't be baked, if that is known.
     """
 
@@ -50,6 +52,7 @@ class Shape:
     filled: float = 1.0
     pieces: float = 1.0
     is_hollow: bool = False
+    bending: Bending = BALL
     planes: int = 1
     error: BakeError | None = None
 
@@ -79,7 +82,13 @@ def shape_of(target: BakeTarget, depsgraph) -> Shape:
             filled = float(polygons.areas.sum()) / length**2
             if not is_bent:
                 return Shape(length, filled=filled, planes=_planes(polygons))
-            facts = lengths_of_faces(polygons), filled, pieces_of_faces(polygons), _is_hollow(polygons)
+            facts = (
+                lengths_of_faces(polygons),
+                filled,
+                pieces_of_faces(polygons),
+                _is_hollow(polygons),
+                bending_of(polygons),
+            )
             return Shape(length, is_bent, *facts)
         except BakeError as error:
             return Shape(error=error)

@@ -11,6 +11,7 @@ import numpy as np
 
 from ..ldf.curvatures import curvatures_for, curved_angles_for, curved_photons_for, transport_length
 from ..ldf.library import PHOTONS, angles_for, is_known
+from ..scene.bending import BALL, Bending
 from ..scene.bent_grid import AnyGrid, BentGrid
 from ..scene.lights import STRATA, AreaLight, Light, MeshLight, WorldLight
 from .bake_settings import BakeSettings
@@ -55,6 +56,11 @@ ADAPTIVE, DIRECT = (1e-6, 3e-6), (0.2e-9, 30e-9)
 # Seconds of the solution on surfaces that bend: in any case, for the tables of its media; and for each piece of a texel
 # with a mean free path of a texel, and each channel of its own there. They grow with this power of the path.
 BENT, BENT_TEXEL, BENT_CHANNEL, BENT_POWER = 1.6, 4.5e-6, 10.5e-6, 0.55
+# They grow with this power of a surface's turning, relative to a ball's, up to this one.
+TURNING_POWER, MAX_TURNING = 0.75, 5.0
+# Seconds of a texel beside a crease as long as the root of the area, for each channel and a mean free path of a texel;
+# and the power of the path.
+CREASE, CREASE_PATH = 50e-6, 1.5
 # Part of a surface that bends that lamps and suns light, about.
 LIT_BY_LAMPS = 0.5
 
@@ -112,6 +118,7 @@ class Workload:
     broad_traced, narrow_traced : number of those that are traced towards obstacles.
     bounced : True if bounced light may be added.
     pieces : into which a texel on surfaces that bend is divided, on average.
+    bending : of a surface that bends.
     channels : number of those whose light is computed; those of one medium under light of one color share it.
     lit : part of a surface that bends that light reaches, about.
     triangles : number of those that block light; 0 without shadows.
@@ -131,6 +138,7 @@ class Workload:
     narrow_traced: float = 0.0
     bounced: bool = False
     pieces: float = 1.0
+    bending: Bending = BALL
     channels: int = 3
     lit: float = 1.0
     triangles: int = 0
@@ -179,7 +187,7 @@ class Workload:
                 both = load.narrow_rays + rays, load.narrow_traced + traced
                 load = replace(load, narrow_rays=both[0], narrow_traced=both[1])
         if is_bent:
-            load = replace(load, pieces=max(grids, key=lambda grid: grid.texels).pieces)
+            load = replace(load, pieces=largest.pieces, bending=largest.bending)
         material, is_unknown = surface.material, bounced or unknown > 0
         reaching = [light for light, _ in shared]
         is_around = is_unknown or any(isinstance(light, WorldLight) for light in reaching)
@@ -225,7 +233,9 @@ class Workload:
         directions = self.lamps + self.broad_rays + self.narrow_rays + len(STRATA) * self.bounced
         if self.is_bent and settings.solver != "direct":
             of_piece = (BENT_TEXEL + BENT_CHANNEL * self.channels) * self.path**BENT_POWER
-            return BENT + of_piece * self.texels * self.pieces * self.lit
+            of_piece *= min(max(self.bending.turning, 1.0), MAX_TURNING) ** TURNING_POWER
+            of_creases = CREASE * self.bending.creases * self.channels * self.path**CREASE_PATH * self.texels**0.5
+            return BENT + (of_piece * self.texels * self.pieces + of_creases) * self.lit
         if settings.solver != "fft":
             sun, direction = ADAPTIVE if settings.solver == "adaptive" else DIRECT
             pairs = self.texels if settings.solver == "adaptive" else self.texels**2

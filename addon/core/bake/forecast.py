@@ -6,6 +6,7 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 
 from ..ldf.library import SIMULATING
+from ..scene.bending import Bending
 from ..scene.bent_grid import AnyGrid
 from ..scene.lights import Light
 from .bake_settings import BakeSettings
@@ -62,6 +63,7 @@ class Forecast:
     unknown : fraction of all light, about, that is not among the lights, besides that which Cycles finds.
     is_bent : True if the receiver is a mesh that bends.
     pieces : into which its texels are divided, on average, if it bends and the grids don't tell; see `Workload`.
+    bending : of the receiver, likewise.
     scatters : True if light scatters in a texture's albedos.
     planes : of the receiver, if the grids don't tell.
     glowing : number of meshes that glow, if the lights don't tell.
@@ -76,6 +78,7 @@ class Forecast:
     unknown: float = 0.0
     is_bent: bool = False
     pieces: float = 0.0
+    bending: Bending | None = None
     scatters: bool = False
     planes: int = 0
     glowing: int = 0
@@ -102,7 +105,7 @@ class Forecast:
         shares = [finders.around.shares_on(side) for side in range(2)]
         light = {"lights": self.lights, "triangles": self.triangles, "bounced": bounced, "unknown": unknown}
         loads = workloads_of(self.grids, self.surface, settings, shares, has_all_sides=self.is_bent, **light)
-        facts = {"pieces": self.pieces, "planes": self.planes}
+        facts = {"pieces": self.pieces, "bending": self.bending, "planes": self.planes}
         known = {"is_bent": self.is_bent, **{name: value for name, value in facts.items() if value}}
         # Each light takes a few rays at least.
         loads = [replace(load, broad_traced=load.broad_traced + MIN_RAYS * self.glowing, **known) for load in loads]

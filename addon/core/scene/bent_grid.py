@@ -8,6 +8,7 @@ from functools import cached_property
 import numpy as np
 
 from ..native import native
+from .bending import BALL, Bending
 from .grid import Grid, Vector, owner_number
 from .stretch import pieces_of_texels
 
@@ -39,6 +40,7 @@ class BentGrid:
     finer : texels of the baked grid along a side for each of these; 1 but in an outline.
     owner, color_in, color_out, base_color, albedo : as of a `Grid`.
     is_back : True if the normals are those of the mesh's other side.
+    bending : that of the mesh.
     """
 
     middles: np.ndarray
@@ -55,6 +57,7 @@ class BentGrid:
     is_back: bool = False
     base_color: np.ndarray | None = None
     albedo: np.ndarray | None = None
+    bending: Bending = BALL
 
     # Shadow rays start where texels are.
     clearance = 0.0

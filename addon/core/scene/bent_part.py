@@ -10,6 +10,7 @@ import numpy as np
 
 from ..errors import ReceiverError
 from ..messages import Message, note, warning
+from .bending import BALL, Bending, bending_of
 from .ears import triangle_corners
 from .islands import NO_UV_AREA, UNWRAP, connected_in_map
 from .planes import FLATNESS_TOLERANCE, NO_AREA_BESIDE
@@ -55,9 +56,10 @@ class BentIsland:
 
 @dataclass(frozen=True, eq=False)
 class BentPart:
-    """All faces of a mesh that bends; `islands` are those of each UDIM tile."""
+    """All faces of a mesh that bends; `islands` are those of each UDIM tile, `bending` that of them."""
 
     islands: tuple[BentIsland, ...]
+    bending: Bending = BALL
 
 
 def bent_part(polygons: Polygons) -> BentPart:
@@ -75,7 +77,7 @@ def bent_part(polygons: Polygons) -> BentPart:
     for tile, part in polygons.of_faces(np.flatnonzero(is_shown)).by_tile().items():
         pieces, (corners, owners) = connected_in_map(part), triangle_corners(part, np.arange(part.count))
         islands.append(BentIsland(_outward(part, corners, owners), pieces[owners], tile))
-    return BentPart(tuple(islands))
+    return BentPart(tuple(islands), bending_of(polygons))
 
 
 def _outward(polygons: Polygons, corners: np.ndarray, owners: np.ndarray) -> Polygons:
