@@ -4,7 +4,7 @@ import bpy
 import numpy as np
 import pytest
 import scenes
-from beamspread.blender.cycles import cycles_light, kept_world
+from beamspread.blender.cycles import child_world, cycles_light, kept_world
 from beamspread.blender.cycles.cycles_light import world_panorama
 from beamspread.blender.cycles.scene_copy import SceneCopy
 from beamspread.blender.jobs.run.batch_run import bake_all
@@ -54,6 +54,35 @@ def test_panorama_answers_light_paths_as_to_a_diffuse_surface():
     strength = nodes.add("Math", {0: is_camera, 1: 5.0, 2: 1.0}, operation="MULTIPLY_ADD")
     nodes.set(background.inputs["Strength"], strength.outputs[0])
     np.testing.assert_allclose(panorama(16, 8), np.broadcast_to((0.1, 0.2, 0.3), (8, 16, 3)), rtol=1e-6)
+
+
+def test_smooth_skies_take_a_smaller_panorama_with_the_same_light():
+    """A sky model without a sun, and the same beside a node of another type, which takes the full panorama.
+
+    Light of 32 x 16 parts is the same to the fraction that steps toward fewer texels may change.
+    """
+    nodes, background = scenes.add_world()
+    sky = nodes.add("TexSky", sky_type="HOSEK_WILKIE", sun_direction=(0.6, 0.3, 0.4), turbidity=3.0)
+    nodes.set(background.inputs["Color"], sky.outputs["Color"])
+    assert child_world.is_smooth(bpy.context.scene.world)
+    smaller = panorama(4096, 2048)
+    nodes.add("TexChecker")
+    assert not child_world.is_smooth(bpy.context.scene.world)
+    full = panorama(4096, 2048)
+    parts = [
+        radiance.reshape(16, len(radiance) // 16, 32, radiance.shape[1] // 32, 3).mean(axis=(1, 3))
+        for radiance in (smaller, full)
+    ]
+    assert np.abs(parts[0] / parts[1] - 1).max() <= child_world.MAX_LOSS
+
+
+def test_skies_with_a_sun_and_images_take_the_full_panorama():
+    nodes, background = scenes.add_world()
+    assert child_world.is_smooth(bpy.context.scene.world)
+    for added in (nodes.add("TexSky"), nodes.add("TexEnvironment")):
+        nodes.set(background.inputs["Color"], added.outputs["Color"])
+        assert not child_world.is_smooth(bpy.context.scene.world)
+        bpy.context.scene.world.node_tree.nodes.remove(added)
 
 
 def test_panorama_has_all_of_a_sky_s_sun():
