@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from beamspread import LdfSample, Medium, convolve, convolve_lights, library, luminance, presets
-from beamspread.core.bake.directions import MAX_OWN, beams_of
+from beamspread.core.bake.directions import ANGLES, MAX_OWN, beams_of
 from beamspread.core.native import native
 
 LDF = library(Medium(0.8))
@@ -142,7 +142,7 @@ def test_beams_have_all_the_light():
     light = np.random.default_rng(1).random((48, 40, 3)).astype(np.float32)
     lights = [(light, way), (2 * light, np.float32(DOWN))]
     beams = beams_of(lights)
-    assert 1 < len(beams) <= 8 + MAX_OWN
+    assert 1 < len(beams) <= 4 * ANGLES + MAX_OWN
     np.testing.assert_allclose(sum(part for part, _ in beams), 3 * light, rtol=1e-5)
     for _, direction in beams:
         assert np.linalg.norm(direction) == pytest.approx(1)

@@ -21,6 +21,9 @@ RANGE = 0.05
 STEP = 20.0
 """Degrees between angles from the normal where there may be more than two. Larger: fewer paths, as above."""
 
+ANGLES = 3
+"""Largest number of angles from the normal, with four azimuths each. More: light goes its own way, and more noise."""
+
 MAX_OWN = 3
 """Largest number of lights with a direction of their own. More: longer; fewer: suns that share directions."""
 
@@ -57,7 +60,7 @@ class DirectionClasses:
 
     @classmethod
     def of(
-        cls, powers: Sequence[NDArray], ways: Sequence[NDArray], max_angles: int = 2, one_azimuth: float = NARROW
+        cls, powers: Sequence[NDArray], ways: Sequence[NDArray], max_angles: int = ANGLES, one_azimuth: float = NARROW
     ) -> DirectionClasses:
         """Classes between which nearly all of the light lies, whose power (N,) and directions (N, 3) are given.
 
@@ -147,7 +150,7 @@ class Splitter:
         surveys: Sequence[tuple[NDArray, NDArray]],
         max_own: int = MAX_OWN,
         is_split: bool = True,
-        max_angles: int = 2,
+        max_angles: int = ANGLES,
         one_azimuth: float = NARROW,
     ) -> Splitter:
         """From powers (...) and directions (..., 3) of each light; not `is_split`: others have their mean one.
