@@ -11,6 +11,7 @@
 #include <cstring>
 
 #include "simd/loops.h"
+#include "simd/wide-inl.h"
 
 HWY_BEFORE_NAMESPACE();
 namespace beamspread {
@@ -31,7 +32,7 @@ void add_scaled_double(double* sum, const double* values, double factor, std::si
 void multiply_rows(float* __restrict product, const float* factors, const float* rows, std::size_t columns,
                    std::size_t count, std::size_t width)
 {
-    using Values = float __attribute__((vector_size(values_per_block * sizeof(float))));
+    using Values = Wide<values_per_block>;
     // Columns per pass: enough to keep an adder busy, few enough for registers. Each row is read once per pass.
     constexpr std::size_t at_once = 4;
     for (std::size_t first = 0; first < columns; first += at_once) {
@@ -42,12 +43,12 @@ void multiply_rows(float* __restrict product, const float* factors, const float*
             std::array<Values, at_once> sums{};
             for (std::size_t k = 0; k < count; ++k) {
                 Values row;
-                std::memcpy(&row, rows + k * width + i, sizeof(row));
+                row.load(rows + k * width + i);
                 for (std::size_t c = 0; c < at_once; ++c)
                     sums[c] += factor[c][k] * row;
             }
             for (std::size_t c = 0; c < at_once && first + c < columns; ++c)
-                std::memcpy(product + (first + c) * width + i, &sums[c], sizeof(Values));
+                sums[c].store(product + (first + c) * width + i);
         }
     }
 }
@@ -240,11 +241,12 @@ HWY_AFTER_NAMESPACE();
 namespace beamspread {
 
 // Defines a function that calls the loop of that name for the best target.
-#define BEAMSPREAD_DISPATCH(name, parameters, arguments) \
-    HWY_EXPORT(name);                                    \
-    void name parameters                                 \
-    {                                                    \
-        HWY_DYNAMIC_DISPATCH(name) arguments;            \
+#define BEAMSPREAD_DISPATCH(name, parameters, arguments)                       \
+    HWY_EXPORT(name);                                                          \
+    void name parameters                                                       \
+    {                                                                          \
+        /* NOLINTNEXTLINE(bugprone-macro-parentheses): they have their own. */ \
+        HWY_DYNAMIC_DISPATCH(name) arguments;                                  \
     }
 
 BEAMSPREAD_DISPATCH(add_scaled, (float* sum, const float* values, float factor, std::size_t count),

@@ -13,13 +13,14 @@
 #include <limits>
 #include <type_traits>
 
+#include "simd/wide-inl.h"
 #include "solve/surface/pair_sum.h"
 
 HWY_BEFORE_NAMESPACE();
 namespace beamspread {
 namespace HWY_NAMESPACE {
 
-using Lanes = float __attribute__((vector_size(lanes_per_block * sizeof(float))));
+using Lanes = Wide<lanes_per_block>;
 using Harmonics8 = float __attribute__((vector_size(surface_harmonics * sizeof(float))));
 using Indices8 = std::int32_t __attribute__((vector_size(surface_harmonics * sizeof(std::int32_t))));
 static_assert(lanes_per_block == 2 * surface_harmonics);
@@ -27,11 +28,6 @@ static_assert(lanes_per_block == 2 * surface_harmonics);
 // Length of a chord in the tangent plane, over the chord, below which harmonics fade. Larger: smoother where light
 // crosses edges, less exact around balls.
 constexpr float steep = 0.5f;
-
-[[gnu::always_inline]] inline void load(const float* values, Lanes& lanes)
-{
-    std::memcpy(&lanes, values, sizeof(lanes));
-}
 
 // Real and imaginary part of the powers m below 2^count of x + i y; count is at most 3.
 [[gnu::always_inline]] inline void powers(float x, float y, std::size_t count, Harmonics8& real, Harmonics8& imaginary)
@@ -53,16 +49,28 @@ constexpr float steep = 0.5f;
 }
 
 // The values of each lane's harmonic.
-[[gnu::always_inline]] inline void spread(const Harmonics8& values, const std::int32_t* harmonic, Lanes& lanes)
+template <class Vector>
+[[gnu::always_inline]] inline void spread(const Harmonics8& values, const std::int32_t* harmonic, Vector& lanes)
 {
 #if defined(__clang__)
+    std::array<float, lanes_per_block> chosen;
     for (std::size_t i = 0; i < lanes_per_block; ++i)
-        lanes[i] = values[harmonic[i]];
+        chosen[i] = values[harmonic[i]];
+    lanes.load(chosen.data());
 #else
     std::array<Indices8, 2> half;
     std::memcpy(half.data(), harmonic, sizeof(half));
-    lanes = __builtin_shufflevector(__builtin_shuffle(values, half[0]), __builtin_shuffle(values, half[1]), 0, 1, 2, 3,
-                                    4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15);
+    const Harmonics8 low = __builtin_shuffle(values, half[0]);
+    const Harmonics8 high = __builtin_shuffle(values, half[1]);
+    if constexpr (Vector::part_count == 1) {
+        lanes.parts = {__builtin_shufflevector(low, high, 0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15)};
+    } else if constexpr (Vector::part_count == 2) {
+        lanes.parts = {low, high};
+    } else {
+        lanes.parts = {__builtin_shufflevector(low, low, 0, 1, 2, 3), __builtin_shufflevector(low, low, 4, 5, 6, 7),
+                       __builtin_shufflevector(high, high, 0, 1, 2, 3),
+                       __builtin_shufflevector(high, high, 4, 5, 6, 7)};
+    }
 #endif
 }
 
@@ -307,13 +315,13 @@ template <std::size_t most_groups, bool is_one_block, class Source>
     std::array<Lanes, 2> light_of_block;
     const auto load_light = [&](std::size_t g, std::size_t b) __attribute__((always_inline)) {
         const float* values = of_source + (tables.lanes.set[g] * tables.lanes.blocks + b) * 2 * lanes_per_block;
-        load(values, light_of_block[0]);
-        load(values + lanes_per_block, light_of_block[1]);
+        light_of_block[0].load(values);
+        light_of_block[1].load(values + lanes_per_block);
     };
     Lanes is_first;  // 1 where m is 1, else 0
     if constexpr (is_one_block) {
         load_light(0, 0);
-        load(tables.lanes.is_first.data(), is_first);
+        is_first.load(tables.lanes.is_first.data());
     }
     for (std::size_t i = 0; i < targets.count; ++i) {
         if (!(pairs.chord[i] < tables.reach) || (!is_cluster && source.moments == targets.own[i]))
@@ -341,14 +349,14 @@ template <std::size_t most_groups, bool is_one_block, class Source>
         const auto interpolate = [&](std::size_t g, const float* values, Lanes& value) __attribute__((always_inline)) {
             const float* first = values + rows[g].first[i];
             std::array<Lanes, 2> row;
-            load(first, row[0]);
-            load(first + lanes, row[1]);
+            row[0].load(first);
+            row[1].load(first + lanes);
             value = row[0] * rows[g].weight[0][i] + row[1] * rows[g].weight[1][i];
             if (at_node)
                 return;
             const float* high = first + rows[g].to_high[i];
-            load(high, row[0]);
-            load(high + lanes, row[1]);
+            row[0].load(high);
+            row[1].load(high + lanes);
             value += row[0] * rows[g].weight[2][i] + row[1] * rows[g].weight[3][i];
         };
         for (std::size_t b = 0; b < (is_one_block ? 1 : blocks); ++b) {
@@ -359,7 +367,7 @@ template <std::size_t most_groups, bool is_one_block, class Source>
                 spread(imaginary, tables.lanes.harmonic.data() + at, sines);
             } else {
                 if constexpr (!is_one_block)
-                    load(tables.lanes.is_first.data() + at, is_first);
+                    is_first.load(tables.lanes.is_first.data() + at);
                 cosines = weight + is_first * (weight * (pairs.cosine[i] - 1.0f));
                 sines = is_first * (weight * pairs.sine[i]);
             }
@@ -385,11 +393,11 @@ template <std::size_t most_groups, bool is_one_block, class Source>
                     if (b == 0) {
                         Lanes second;
                         const std::size_t nearest = rows[g].nearest[i] + at;
-                        load(tables.point->laplacian.values[g].data() + nearest, second);
+                        second.load(tables.point->laplacian.values[g].data() + nearest);
                         value += second * (source.spread * pairs.per_square[i]);
-                        load(tables.point->along.values[g].data() + nearest, second);
+                        second.load(tables.point->along.values[g].data() + nearest);
                         value += second * pairs.along[i];
-                        load(tables.point->across.values[g].data() + nearest, second);
+                        second.load(tables.point->across.values[g].data() + nearest);
                         product = light * value + turned * (second * pairs.across[i]);
                     }
                 }
@@ -419,11 +427,11 @@ void add_pairs_of(const PairTables& tables, const PairTargets& targets, const Pa
     std::array<float, lanes_per_block> values;
     for (std::size_t i = 0; i < targets.count; ++i) {
         for (std::size_t g = 0; g < tables.lanes.groups; ++g) {
-            std::memcpy(values.data(), &all.all[i][g], sizeof(values));
+            all.all[i][g].store(values.data());
             tables.lanes.add(g, values.data(), sums + i * max_results);
         }
         std::array<float, max_results> of_results{};
-        std::memcpy(values.data(), &all.beyond[i], sizeof(values));
+        all.beyond[i].store(values.data());
         tables.lanes.add(0, values.data(), of_results.data());
         beyond[i] += of_results[0];
     }

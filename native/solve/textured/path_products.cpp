@@ -7,21 +7,21 @@
 #include <hwy/highway.h>
 
 #include <array>
-#include <cstring>
 
+#include "simd/wide-inl.h"
 #include "solve/textured/path_products.h"
 
 HWY_BEFORE_NAMESPACE();
 namespace beamspread {
 namespace HWY_NAMESPACE {
 
-using Row = float __attribute__((vector_size(tile_columns * sizeof(float))));
+using Row = Wide<tile_columns>;
 
 // Multiplies by a row of texels.
 [[gnu::always_inline]] inline void multiply(Row& product, const float* values)
 {
     Row row;
-    std::memcpy(&row, values, sizeof(row));
+    row.load(values);
     product *= row;
 }
 
@@ -29,8 +29,11 @@ void add_path_products(const PlacedPaths& paths, std::size_t count, float scale,
                        float* textured, float* plain)
 {
     std::array<Row, tile_rows> sum, plain_sum;
-    std::memcpy(&sum, textured, sizeof(sum));
-    std::memcpy(&plain_sum, plain, sizeof(plain_sum));
+#pragma GCC unroll 16
+    for (std::size_t r = 0; r < tile_rows; ++r) {
+        sum[r].load(textured + r * tile_columns);
+        plain_sum[r].load(plain + r * tile_columns);
+    }
     const std::ptrdiff_t stride = planes.stride;
     for (std::size_t p = 0; p < count; ++p) {
         const std::ptrdiff_t* place = paths.places.data() + paths.first[p];
@@ -41,7 +44,7 @@ void add_path_products(const PlacedPaths& paths, std::size_t count, float scale,
 #pragma GCC unroll 16
         for (std::size_t r = 0; r < tile_rows; ++r) {
             const std::ptrdiff_t row = static_cast<std::ptrdiff_t>(r) * stride;
-            std::memcpy(&product[r], planes.light + paths.light[p] + row, sizeof(Row));
+            product[r].load(planes.light + paths.light[p] + row);
             product[r] *= scale;
             if (planes.coverage != nullptr)
                 multiply(product[r], planes.coverage + *place + row);
@@ -59,8 +62,11 @@ void add_path_products(const PlacedPaths& paths, std::size_t count, float scale,
         for (std::size_t r = 0; r < tile_rows; ++r)
             sum[r] += product[r];
     }
-    std::memcpy(textured, &sum, sizeof(sum));
-    std::memcpy(plain, &plain_sum, sizeof(plain_sum));
+#pragma GCC unroll 16
+    for (std::size_t r = 0; r < tile_rows; ++r) {
+        sum[r].store(textured + r * tile_columns);
+        plain_sum[r].store(plain + r * tile_columns);
+    }
 }
 
 }  // namespace HWY_NAMESPACE

@@ -7,16 +7,16 @@
 #include <hwy/highway.h>
 
 #include <array>
-#include <cstring>
 
+#include "simd/wide-inl.h"
 #include "solve/textured/ratio_rows.h"
 
 HWY_BEFORE_NAMESPACE();
 namespace beamspread {
 namespace HWY_NAMESPACE {
 
-using Values = float __attribute__((vector_size(16 * sizeof(float))));
-constexpr std::size_t lanes = sizeof(Values) / sizeof(float);
+constexpr std::size_t lanes = 16;
+using Values = Wide<lanes>;
 
 void sum_rows(float* sum, std::span<const float* const> rows, std::span<const float> weights, std::size_t count)
 {
@@ -29,11 +29,13 @@ void sum_rows(float* sum, std::span<const float* const> rows, std::span<const fl
 #pragma GCC unroll 4
             for (std::size_t v = 0; v < at_once; ++v) {
                 Values row;
-                std::memcpy(&row, rows[k] + i + v * lanes, sizeof(row));
+                row.load(rows[k] + i + v * lanes);
                 sums[v] += weights[k] * row;
             }
         }
-        std::memcpy(sum + i, &sums, sizeof(sums));
+#pragma GCC unroll 4
+        for (std::size_t v = 0; v < at_once; ++v)
+            sums[v].store(sum + i + v * lanes);
     }
     for (; i < count; ++i) {
         float one = 0.0f;
