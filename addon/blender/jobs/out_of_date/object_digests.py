@@ -257,16 +257,12 @@ def _content(obj) -> str:
 
 
 def _shown_materials(obj) -> list:
-    """The materials of an object's slots, without empty ones at the end that no face has."""
+    """The materials of an object's slots, without those at the end that no face has."""
     materials = [slot.material for slot in obj.material_slots]
-    if not any(materials):
-        return []
-    if materials[-1] is None and obj.type == "MESH":
+    if len(materials) > 1 and obj.type == "MESH":
         # An evaluated mesh in Edit Mode has no polygons.
-        last = max(_largest_slot(obj.data), _largest_slot(obj.original.data))
-        while materials[-1] is None and last < len(materials) - 1:
-            materials.pop()
-    return materials
+        del materials[max(_largest_slot(obj.data), _largest_slot(obj.original.data)) + 1 :]
+    return materials if any(materials) else []
 
 
 def _largest_slot(mesh) -> int:
