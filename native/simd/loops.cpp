@@ -6,6 +6,7 @@
 #include <hwy/foreach_target.h>
 #include <hwy/highway.h>
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <cstring>
@@ -185,12 +186,15 @@ void find_angles(const float* directions, const float* irradiance, float* __rest
     }
 }
 
-// A vector at any address of doubles.
-using Lanes = double __attribute__((vector_size(64), aligned(8), may_alias));
-static_assert(2 * sizeof(Lanes) == target_columns * sizeof(double));
+// A vector of the target's size at any address of doubles. GCC keeps larger ones in memory.
+constexpr std::size_t lanes_bytes = std::max<std::size_t>(HWY_MAX_BYTES, 16);
+using Lanes = double __attribute__((vector_size(lanes_bytes), aligned(8), may_alias));
+constexpr auto columns_at_once = static_cast<std::ptrdiff_t>(2 * sizeof(Lanes) / sizeof(double));
+static_assert(target_columns % columns_at_once == 0);
 
-void add_sources(double* const* sums, std::ptrdiff_t x, const LitColumn* source, std::ptrdiff_t last,
-                 const double* kernel)
+// Adds to the sums of `columns_at_once` columns from x on.
+[[gnu::always_inline]] inline void add_sources_at(double* const* sums, std::ptrdiff_t x, const LitColumn* source,
+                                                  std::ptrdiff_t last, const double* kernel)
 {
     static_assert(target_rows == 4);
     auto* to0 = reinterpret_cast<Lanes*>(sums[0] + x);
@@ -222,6 +226,13 @@ void add_sources(double* const* sums, std::ptrdiff_t x, const LitColumn* source,
     to2[1] = right2;
     to3[0] = left3;
     to3[1] = right3;
+}
+
+void add_sources(double* const* sums, std::ptrdiff_t x, const LitColumn* source, std::ptrdiff_t last,
+                 const double* kernel)
+{
+    for (std::ptrdiff_t column = 0; column < target_columns; column += columns_at_once)
+        add_sources_at(sums, x + column, source, last, kernel);
 }
 
 void scatter_bits(double* __restrict result, const std::uint32_t* offsets, std::uint32_t block, std::uint32_t seed,
