@@ -25,8 +25,11 @@ def slab(medium, every=1):
 
 
 def coarse(medium):
-    """For solvers against each other: the adaptive one measures the kernels of each angle first."""
-    return slab(medium, 3)
+    """For solvers against each other: the adaptive one measures the kernels of each angle first.
+
+    Half of the angles: between those of a third, 30 and 54 degrees, solvers cut harmonics of thin slabs differently.
+    """
+    return slab(medium, 2)
 
 
 def far(irradiance, direction, ldf, *arguments, **options):

@@ -102,7 +102,7 @@ def test_a_bake_that_takes_more_memory_than_allowed_is_refused(arguments):
 
 @pytest.mark.skipif(not Path("/proc/self/clear_refs").exists(), reason="peaks are read as Linux tells them")
 @pytest.mark.parametrize(
-    ("size", "medium", "least"), [(1280, (0.8, 1.0, 0.04, 0.0), 1e9), (1024, (0.6, 1.4, 0.01, 0.0), 5e8)]
+    ("size", "medium", "least"), [(1280, (0.8, 1.0, 0.04, 0.0), 1e9), (1152, (0.6, 1.4, 0.01, 0.0), 5e8)]
 )
 def test_a_large_bake_that_takes_much_less_is_not_refused(size, medium, least):
     peak, is_allowed = peak_of(1.4, size, "fft", ("lamp", "world"), COLORED, medium)
