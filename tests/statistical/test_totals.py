@@ -17,9 +17,9 @@ MEDIA = sorted({(row["g"], row["ior"], row["thickness_mfp"]) for row in adding_d
 
 
 def photons_for(g, ior, thickness):
-    """Enough for a standard error of 0.5 % in every row; few where the light turns around at once."""
+    """Enough for a standard error of 0.4 % in every row; few where the light turns around at once."""
     if math.isinf(thickness):
-        return 600_000 if ior > 1 and g == 0 else 300_000
+        return 900_000 if ior > 1 else 500_000
     return 1_000_000 if g > 0 else 400_000
 
 
