@@ -76,8 +76,8 @@ def bent(positions, steps, normals, tangents, areas, albedo):
     )
 
 
-# Body, radius, texture, and the bounds of the L1 distance and of the total. Measured: .5, .7, .5, .3 % and -.4, 1.4,
-# 1.4, -.3 %; cylinders of 6 of one albedo are 1 to 1.7 % too bright.
+# Body, radius, texture, and the bounds of the L1 distance and of the total. Measured: .4, .6, .4, .2 % and -.6, 1.3,
+# 1.2, -.3 %; cylinders of 6 of one albedo are 1 to 1.7 % too bright.
 CASES = {
     "ball of 6": (Ball, 6, veins(32, 64, 6, 4), 0.02, 0.015),
     "cylinder of 6": (Cylinder, 6, veins(16, 64, 6, 2), 0.02, 0.015),

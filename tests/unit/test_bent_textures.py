@@ -47,18 +47,11 @@ def distance(ours, truth):
 
 @pytest.mark.parametrize("thickness", [np.inf, 4.0])
 def test_a_flat_mesh_is_as_a_plane(thickness):
-    """The mesh has 2 % of noise at most, root mean square, and the plane 1 %; the solvers differ by .6 %. Slabs have
-    light on both faces.
-
-    Errors of sums are an eighth: .25 and .125 %, together three times .28 %, and the solvers' sums differ by .1 %.
-    Paths go on beyond the end of the surface. The last columns are 1.2 % darker than on the plane, with .45 % of noise;
-    if the gaps between tangent planes were black, 4 %.
-    """
+    """Both have 2 % of noise at most, root mean square; the solvers differ by .6 %. Slabs have light on both faces."""
     lights = [SUN] if np.isinf(thickness) else [SUN, BELOW]
     planes, meshes = (spread([grid], spreading(lights, thickness))[0] for grid in (PLANE, as_mesh(PLANE)))
     assert distance(meshes, planes) < 0.03
     assert meshes.sum() == pytest.approx(planes.sum(), rel=0.01)
-    assert meshes[:, -2:].sum() == pytest.approx(planes[:, -2:].sum(), rel=0.03)
 
 
 def ratios(grid, **options):

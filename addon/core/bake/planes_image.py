@@ -118,9 +118,7 @@ class PlanesImage:
         for part in (plane.part for plane in self.planes):
             if (wanted[part] & ~known[part]).any():
                 image[part] = continued(image[part], known[part])
-                known[part] = True
-        # Paths near the end of a surface pass texels between planes.
-        return continued(image, known) if wanted.all() else image
+        return image
 
     @cached_property
     def _is_surface(self) -> NDArray:

@@ -30,9 +30,6 @@ MAX_STRETCH = 2.0
 CANDIDATES, MAX_PLANES = 16_384, 512
 """Points among which middles are chosen, and number of middles at most. More: slower; fewer planes: more distortion."""
 
-END = 0.25
-"""Width of a plane beyond the end of the surface, in distances from which light comes. Larger: longer."""
-
 MISMATCH_POWER = 4.0
 """Power of nearness to the plane's part of the surface by which points count. Larger: other layers count less."""
 
@@ -137,10 +134,8 @@ class TangentPlane:
         chosen = np.flatnonzero((length <= reach) & (_dot(points.normals, middle.normal) > FACING))
         shown = points.at(chosen)
         places, mismatch = _places(middle, shown, pitch)
-        # Paths go on beyond the end of the surface, among values of its own.
-        ends, most, beyond = (places.min(axis=0), places.max(axis=0)), reach / pitch, END * halo / pitch
-        low = np.floor(np.maximum(ends[0] - beyond, np.minimum(ends[0], -most))) - 1
-        size = np.ceil(np.minimum(ends[1] + beyond, np.maximum(ends[1], most))) + 2 - low
+        low = np.floor(places.min(axis=0)) - 1
+        size = np.ceil(places.max(axis=0)) + 2 - low
         weights = np.float32((pitch / (pitch + mismatch)) ** MISMATCH_POWER)
         facts = tuple(size.astype(int).tolist()), chosen, places - low, weights, middle.turns(shown)
         return cls(middle, pitch, low, *facts)
