@@ -186,7 +186,7 @@ def test_fine_patterns_are_averaged(plane):
     assert ours == pytest.approx(np.full_like(ours, 0.5), rel=1e-4)
 
 
-def test_colours_of_vertices_inside_a_group():
+def test_colors_of_vertices_inside_a_group():
     add_sun(0)
     obj = add_plane(material=add_group_material())
     colors = obj.data.attributes.new("Painted", "FLOAT_COLOR", "CORNER")

@@ -104,7 +104,7 @@ def painted(color, name):
     return principled(name, Base_Color=(*color, 1))
 
 
-def test_a_closed_room_of_coloured_walls():
+def test_a_closed_room_of_colored_walls():
     """Blocks of 4 x 4 texels are 1 % off on average; noise of both is less than half of that."""
     ours, truth = compare(add_room(), block=0.03)
     assert np.abs(ours - truth).mean() < 0.01 * truth.mean()

@@ -58,7 +58,7 @@ def test_materials_that_the_scene_does_not_use_are_no_obstacle():
 
 
 @pytest.mark.parametrize("in_group", [False, True])
-def test_a_textured_floor_returns_its_colours(in_group):
+def test_a_textured_floor_returns_its_colors(in_group):
     """Red on one side, blue on the other, the node's own colour black: against a diffuse floor of the same nodes.
 
     All of each colour within 2 %; means of 4 x 4 texels within 2.5 % of the brightest, at the median of those lit.

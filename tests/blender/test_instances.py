@@ -407,7 +407,7 @@ def test_cycles_counts_an_instanced_lamp_once():
     np.testing.assert_allclose(irradiance(), truth, rtol=0, atol=0.02 * truth.max())
 
 
-def test_a_colour_by_cycles_is_that_of_real_objects():
+def test_a_color_by_cycles_is_that_of_real_objects():
     """By coordinates of its own and of the world, in an object that is skewed as it stands."""
     holder, collection, matrix = in_the_scene()
     material = bpy.data.materials["Medium"]

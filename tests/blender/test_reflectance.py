@@ -27,7 +27,7 @@ def test_interior_of_a_uniformly_lit_plane(angle, ior, g):
     assert interior.std(axis=0) == pytest.approx(0, abs=1e-3)
 
 
-def test_colours_and_strengths_of_several_suns_add():
+def test_colors_and_strengths_of_several_suns_add():
     bpy.context.scene.beamspread.resolution = 32
     plane = add_plane(material=add_material(albedo=(0.9,) * 3, mean_free_path=(0.002,) * 3))
     first = add_sun(0, strength=2.0, color=(1.0, 0.5, 0.0))

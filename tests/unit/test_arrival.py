@@ -44,7 +44,7 @@ def lamp_light():
     return LAMP.strength * -way[..., 2:] / (4 * math.pi * distance**3) * LAMP.color, way / distance
 
 
-def test_a_sun_arrives_with_its_cosine_colour_and_direction():
+def test_a_sun_arrives_with_its_cosine_color_and_direction():
     irradiance, direction = arriving(SUN)
     assert irradiance == pytest.approx(np.broadcast_to([1, 0.5, 0.25], irradiance.shape), rel=ROUNDING)
     assert direction == pytest.approx(np.broadcast_to(travel(60, 30), direction.shape), abs=ROUNDING)

@@ -56,7 +56,7 @@ def test_interior_under_a_sun():
     assert luminance[12, 12] == pytest.approx(reflectance(0) * 2 / math.pi, rel=2e-3)
 
 
-def test_lights_add_up_and_colours_stay_apart():
+def test_lights_add_up_and_colors_stay_apart():
     red = replace(SUN, color=(1.0, 0.0, 0.0))
     blue = replace(SUN, color=(0.0, 0.0, 1.0), direction=(math.sin(0.5), 0.0, -math.cos(0.5)))
     both = bake(square(), Illumination([red, blue]), MATERIAL, 0.0, SETTINGS)
@@ -279,7 +279,7 @@ def test_most_of_the_progress_is_that_of_rays_where_a_light_has_a_size():
     assert len([fraction for fraction in seen if 0.1 < fraction < 0.9]) >= 3
 
 
-def test_job_works_out_the_albedo_of_a_base_colour():
+def test_job_works_out_the_albedo_of_a_base_color():
     surface = Surface(replace(MATERIAL, albedo=(2.0, 2.0, 2.0)), base_color=(0.5, 0.3, 0.1))
     albedo = surface.resolve("preview").albedo
     library = beamspread.library(beamspread.Medium(g=0.0, ior=1.0), quality="preview")

@@ -42,13 +42,13 @@ def assert_within(tolerance, result, expected):
     assert (error / (tolerance * nearby + 1e-5 * expected.max((0, 1)))).max() <= 1
 
 
-def test_many_lamps_of_any_colour_are_the_sum_of_each(ldf):
+def test_many_lamps_of_any_color_are_the_sum_of_each(ldf):
     lights = [_native.PlaneLight(beams, travel, color.tolist()) for _, color, beams, travel in lamps(12)]
     apart = sum(solve([light], ldf, 1e-5) for light in lights)
     assert_within(TOLERANCE, solve(lights, ldf), apart)
 
 
-def test_the_colour_counts_in_the_brightness():
+def test_the_color_counts_in_the_brightness():
     """Irradiance is that of a colour of 1: many weak lamps of much of it don't decide about the strong one's terms."""
     clear = library(Medium(0.8, 1.0))
     lights = [_native.PlaneLight(*lamp(60, 90, 4), [1.0, 1.0, 1.0])]
@@ -91,7 +91,7 @@ def test_suns_of_many_directions_share_a_basis(ldf):
     assert_within(TOLERANCE, solve(lights, ldf), apart)
 
 
-def test_suns_of_one_direction_and_several_colours(ldf):
+def test_suns_of_one_direction_and_several_colors(ldf):
     rng = np.random.default_rng(7)
     travel = np.array((0.6, 0, -0.8), np.float32)
     red, blue = rng.random((2, 60, 60), np.float32)

@@ -86,7 +86,7 @@ def list_presets(_options) -> None:
 
 
 def albedo(options) -> None:
-    """Print the albedo that gives a colour."""
+    """Print the albedo that gives a color."""
     if len(options.color) not in (1, 3):
         raise ValueError(f"--color has {len(options.color)} values; allowed: one, or red green blue")
     medium = _medium(options)

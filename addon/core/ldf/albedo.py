@@ -1,4 +1,4 @@
-"""Single-scattering albedo of a medium with a given colour."""
+"""Single-scattering albedo of a medium with a given color."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ def albedo_from_color(
 ) -> RGB:
     """Single-scattering albedo whose reflectance under uniform diffuse light is `color`.
 
-    The albedo grows with the colour, from 0 for black. Colours brighter than the medium can be get `MAX_ALBEDO`
+    The albedo grows with the color, from 0 for black. Colors brighter than the medium can be get `MAX_ALBEDO`
     (0.99999): some light is reflected before it enters, and some leaves a slab on the other side.
 
     Parameters
@@ -35,7 +35,7 @@ def albedo_from_color(
     Raises
     ------
     ValueError
-        The colour is not one or three numbers in [0, 1], or the quality is unknown.
+        The color is not one or three numbers in [0, 1], or the quality is unknown.
     Cancelled
         `progress` returned False.
     """
