@@ -26,30 +26,12 @@ from scenes import (
     pixels,
     select,
 )
-
-PLANE = Target("Plane", "Medium")
-
-
-def row(target=PLANE):
-    stale.refresh(bpy.context)
-    return state.rows[target]
-
-
-def update():
-    bpy.context.view_layer.update()
+from standings import PLANE, baked_plane, row, update
 
 
 @pytest.fixture
 def plane():
-    """Baked under a sun, beside a wall."""
-    bpy.context.scene.beamspread.resolution = 32
-    plane = add_plane(material=add_material())
-    add_sun(20)
-    add_blocker(1.0)
-    assert row().status == Status.NEVER
-    bake(plane)
-    assert row().status == Status.BAKED
-    return plane
+    return baked_plane()
 
 
 def test_a_script_that_removes_objects_is_no_obstacle(plane):
@@ -96,13 +78,6 @@ def vertex(_plane):
     mesh = bpy.data.objects["Wall"].data
     mesh.vertices[2].co.z = 3
     mesh.update()
-
-
-def see_through(_plane):
-    material = bpy.data.materials.new("Veil")
-    material.use_nodes = True
-    material.node_tree.nodes["Principled BSDF"].inputs["Alpha"].default_value = 0.5
-    bpy.data.objects["Wall"].data.materials.append(material)
 
 
 def test_another_output_of_the_node_before_it(plane):
@@ -396,61 +371,6 @@ def test_a_scan_reads_only_meshes_that_have_changed(plane, monkeypatch):
     update()
     row()
     assert names == ["Wall"]
-
-
-def add_texture(material, socket, folder):
-    """An image file of one colour at an input."""
-    image = bpy.data.images.new("Veil", 8, 8)
-    image.filepath_raw, image.file_format = str(folder / "veil.png"), "PNG"
-    image.save()
-    image.source = "FILE"
-    node = material.node_tree.nodes.new("ShaderNodeTexImage")
-    node.image = image
-    material.node_tree.links.new(socket, node.outputs["Color"])
-    return image
-
-
-def paint(image, value):
-    image.pixels.foreach_set([value] * len(image.pixels))
-    image.update()
-    update()
-
-
-@pytest.mark.parametrize("kind", ["alpha", "base color"])
-def test_pixels_of_textures(plane, kind, tmp_path):
-    if kind == "alpha":
-        see_through(plane)
-        material = bpy.data.materials["Veil"]
-        image = add_texture(material, material.node_tree.nodes["Principled BSDF"].inputs["Alpha"], tmp_path)
-    else:
-        image = add_texture(plane.data.materials[0], node_of(plane.data.materials[0]).inputs["Base Color"], tmp_path)
-    bake(plane)
-    assert row().status == Status.BAKED
-    paint(image, 0.5)
-    assert "textures" in row().messages[0].text
-    bake(plane)
-    assert row().status == Status.BAKED
-    paint(image, 0.7)  # not saved between, and dirty before as after
-    assert "textures" in row().messages[0].text
-    image.save()
-    bake(plane)
-    assert row().status == Status.BAKED
-    (tmp_path / "veil.png").write_bytes((tmp_path / "veil.png").read_bytes()[:-1] + b"x")  # by another program
-    assert "textures" in row().messages[0].text
-    image.pack()
-    update()
-    bake(plane)
-    assert row().status == Status.BAKED
-
-
-def test_a_copy_of_a_file_is_no_other_texture(plane, tmp_path):
-    image = add_texture(plane.data.materials[0], node_of(plane.data.materials[0]).inputs["Base Color"], tmp_path)
-    bake(plane)
-    content = (tmp_path / "veil.png").read_bytes()
-    (tmp_path / "veil.png").unlink()
-    (tmp_path / "veil.png").write_bytes(content)
-    assert not image.is_dirty
-    assert row().status == Status.BAKED
 
 
 def test_how_often_light_may_bounce_counts_where_it_may(plane):

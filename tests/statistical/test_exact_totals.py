@@ -246,12 +246,13 @@ FEW = [
 
 
 @pytest.mark.parametrize("medium", FEW, ids=str)
-@pytest.mark.parametrize(("photons", "tolerance"), [(200, 0.03), (1000, 0.01)])
+@pytest.mark.parametrize(("photons", "tolerance"), [(100, 0.03), (200, 0.03), (1000, 0.01)])
 def test_calibration_of_few_photons(medium, photons, tolerance):
     """Calibrated totals are nearly exact and never exceed the incident light.
 
     Uncalibrated totals are up to 40 % too large. Albedos beyond .99999 ask for orders that a handful of walks reach:
-    1.5 % too much is possible there, and with 100 photons 2.1 %.
+    1.5 % too much is possible there. With 100 photons some draws exceed the incident light, up to 2.1 %: only the error
+    is checked then.
     """
     angles, albedos = [0, 30, 60, 80, 88], [0.01, 0.3, 0.8, 0.95, 0.99, 0.999, 0.9999, 0.99999]
     entering = np.array([1 - specular(angle, medium.ior) for angle in angles])[:, None]
@@ -260,6 +261,8 @@ def test_calibration_of_few_photons(medium, photons, tolerance):
         library = simulate(medium, angles, photons, seed=seed).calibrated()
         got = np.array([[[total(library, side, a, b) for b in albedos] for a in angles] for side in SIDES])
         assert np.abs(got - exact).max() < tolerance
+        if photons == 100:
+            continue
         assert ((got.sum(axis=0) - entering) < 1e-3).all()
         beyond = np.array(
             [[sum(total(library, side, a, b) for side in SIDES) for b in (1 - 1e-6, 1 - 1e-16)] for a in angles]

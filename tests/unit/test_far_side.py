@@ -27,9 +27,10 @@ def slab(medium, every=1):
 def coarse(medium):
     """For solvers against each other: the adaptive one measures the kernels of each angle first.
 
-    Half of the angles: between those of a third, 30 and 54 degrees, solvers cut harmonics of thin slabs differently.
+    The thin slab has half of its angles. With a third, `direct` differs from both other solvers by .2 % of the
+    brightest texel for some photons, also for many; the cause is not known.
     """
-    return slab(medium, 2)
+    return slab(medium, 2 if medium == THIN else 3)
 
 
 def far(irradiance, direction, ldf, *arguments, **options):

@@ -232,7 +232,7 @@ def test_light_of_other_texels_is_that_of_the_nearest(size):
 
 
 def test_channels_of_maps_coverage_and_a_result_in_place():
-    """As each channel alone, and as light that is less by the coverage."""
+    """A channel of maps gives what that channel alone gives. Coverage dims the light that enters."""
     random = np.random.default_rng(2)
     light, part = random.random((48, 40, 3), np.float32), random.random((48, 40), np.float32)
     even = np.ascontiguousarray(convolve(light, DOWN, LDF, 0.9, 1.0, 1.0))

@@ -129,7 +129,7 @@ class Grid:
         return self._of_size(min(self.width, texels), min(self.height, texels))
 
     def gathering(self, texels: int) -> Grid:
-        """As `coarse`, but where possible each of its texels stands for as many of this grid's along both axes."""
+        """A coarse grid whose texels are squares of 1, 4, 16 or 64 of this grid's, if its size allows that."""
         for count in (1, 2, 4, 8):
             if self.width % count == 0 == self.height % count and max(self.width, self.height) <= count * texels:
                 return self._of_size(self.width // count, self.height // count)
