@@ -60,7 +60,7 @@ BENT, BENT_TEXEL, BENT_CHANNEL, BENT_POWER = 1.6, 4.5e-6, 10.5e-6, 0.55
 TURNING_POWER, MAX_TURNING = 0.75, 5.0
 # Seconds of a texel beside a crease as long as the root of the area, for each channel and a mean free path of a texel;
 # and the power of the path.
-CREASE, CREASE_PATH = 50e-6, 1.5
+CREASE, CREASE_PATH = 15e-6, 1.5
 # Part of a surface that bends that lamps and suns light, about.
 LIT_BY_LAMPS = 0.5
 
