@@ -69,6 +69,16 @@ def texels_of(mesh, width, height=None):
     return out
 
 
+def cut_texels(mesh, width, height=None):
+    """The texels that a mesh covers at least in part, and their coverage."""
+    uvs = np.ascontiguousarray((mesh.uvs * (width, height or width)).reshape(-1, 2))
+    corners = np.ascontiguousarray(mesh.vertices[mesh.triangles].reshape(-1, 3))
+    normals = np.ascontiguousarray(mesh.normals.reshape(-1, 3), np.float32)
+    shown = native.bent_texels(uvs, corners, normals, width, height or width)
+    names = ("positions", "steps_x", "steps_y", "normals", "tangents", "areas")
+    return Texels(*[shown[name] for name in names]), np.minimum(shown["covered"], 1)
+
+
 def ball(columns=32, rows=16, radius=1.0, inward=False, zenith=np.pi, smooth=True):
     """A ball by longitude and latitude, or its cap up to a zenith angle; `inward`: the inside is lit."""
     turn, fall = np.linspace(0, 1, columns + 1), np.linspace(0, 1, rows + 1)

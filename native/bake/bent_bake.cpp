@@ -36,7 +36,19 @@ constexpr double pairs_work = 40.0;
 constexpr double reach_power = 0.6;
 
 // Coverage that smaller ones count as: rounding decides about their areas.
-constexpr float least_coverage = 1e-3f;
+constexpr float least_coverage = 1e-5f;
+
+// Replaces the sides of a parallelogram by those of the rectangle of the same covariance, the shorter one first.
+void find_axes(Vec3& across, Vec3& along)
+{
+    const double xx = glm::dot(across, across);
+    const double yy = glm::dot(along, along);
+    const double xy = glm::dot(across, along);
+    const double angle = 0.5 * std::atan2(2.0 * xy, xx - yy);  // of the longer axis
+    const Vec3 longer = across * std::cos(angle) + along * std::sin(angle);
+    across = along * std::cos(angle) - across * std::sin(angle);
+    along = longer;
+}
 
 // The samples of a mesh, in the order of its texels: one for each texel inside, or several for a long one.
 struct Samples {
@@ -51,7 +63,11 @@ struct Samples {
                 continue;
             Vec3 across(texel.step_x);
             Vec3 along(texel.step_y);
-            reduce_steps(across, along);
+            const float coverage = surface.coverage ? surface.coverage[i] : 1.0f;
+            if (coverage < 1.0f)
+                find_axes(across, along);
+            else
+                reduce_steps(across, along);
             const double length = glm::length(along);
             const double longest = std::max(max_stretch * glm::length(across), short_in_paths * mean_free_path);
             const double wanted = length > longest ? std::ceil(length / longest) : 1.0;
@@ -61,7 +77,6 @@ struct Samples {
                 all.push_back({Vec3f(texel.position + at * along - origin), texel.normal, texel.tangent,
                                texel.area / static_cast<float>(pieces)});
                 steps.push_back({Vec3f(across), Vec3f(along / static_cast<double>(pieces))});
-                const float coverage = surface.coverage ? surface.coverage[i] : 1.0f;
                 whole_areas.push_back(all.back().area / std::max(coverage, least_coverage));
             }
         }

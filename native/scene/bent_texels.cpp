@@ -20,6 +20,9 @@ constexpr std::size_t rows_per_band = 32;
 // Barycentric coordinate down to which a point counts as inside: rounding of centroids on an edge.
 constexpr double inside_tolerance = 1e-9;
 
+// Part of a texel's area from which on it counts as whole.
+constexpr double whole_fraction = 1.0 - 1e-6;
+
 double cross(const Vec2& a, const Vec2& b)
 {
     return a.x * b.y - a.y * b.x;
@@ -53,28 +56,50 @@ Convex cut(const Convex& polygon, int axis, double bound, double sign)
     return part;
 }
 
-// Area of a part of a texel, and its centroid times the area.
+// Area of a part of a texel, and the integrals of place over the area, and of squares of place from the texel's corner.
 struct Moment {
     double area = 0.0;
     Vec2 first{};
+    Vec2 squares{};        // x^2, y^2
+    double product = 0.0;  // x y
 
     void add(const Moment& part)
     {
         area += part.area;
         first += part.first;
+        squares += part.squares;
+        product += part.product;
     }
     Vec2 centroid() const { return first / area; }
 };
 
-Moment moment_of(const Convex& polygon)
+// Columns of the symmetric matrix that turns a whole texel to one of the same covariance as a part. Its scale is off where
+// the part is no parallelogram.
+std::array<Vec2, 2> shape_of(const Moment& part, const Vec2& corner)
+{
+    const Vec2 middle = part.centroid() - corner;
+    const double of_square = 12.0;  // 1 over the variance of a square of side 1
+    const double xx = of_square * (part.squares.x / part.area - middle.x * middle.x);
+    const double yy = of_square * (part.squares.y / part.area - middle.y * middle.y);
+    const double xy = of_square * (part.product / part.area - middle.x * middle.y);
+    // The root of a symmetric matrix M of 2 x 2 is (M + sqrt(det M) I) / sqrt(tr M + 2 sqrt(det M)).
+    const double root = std::sqrt(std::max(xx * yy - xy * xy, 0.0));
+    const double scale = 1.0 / std::sqrt(xx + yy + 2.0 * root);
+    return {Vec2(xx + root, xy) * scale, Vec2(xy, yy + root) * scale};
+}
+
+// `corner`: of the texel.
+Moment moment_of(const Convex& polygon, const Vec2& corner)
 {
     Moment sum;
     for (std::size_t i = 1; i + 1 < polygon.count; ++i) {
-        const Vec2& o = polygon.corners[0];
-        const Vec2& a = polygon.corners[i];
-        const Vec2& b = polygon.corners[i + 1];
+        const Vec2 o = polygon.corners[0] - corner;
+        const Vec2 a = polygon.corners[i] - corner;
+        const Vec2 b = polygon.corners[i + 1] - corner;
         const double area = 0.5 * std::abs(cross(a - o, b - o));
-        sum.add({area, (o + a + b) * (area / 3.0)});
+        const Vec2 all = o + a + b;
+        sum.add({area, (corner + all / 3.0) * area, (o * o + a * a + b * b + all * all) * (area / 12.0),
+                 (o.x * o.y + a.x * a.y + b.x * b.y + all.x * all.y) * (area / 12.0)});
     }
     return sum;
 }
@@ -173,10 +198,10 @@ void for_each_part(const Mapped& triangle, std::size_t first, std::size_t last, 
         for (std::size_t x = within.begin; x < within.end; ++x) {
             const double left = static_cast<double>(x);
             if (left >= full_begin && left + 1.0 <= full_end) {
-                visit(x, y, Moment{1.0, {left + 0.5, bottom + 0.5}});
+                visit(x, y, Moment{1.0, {left + 0.5, bottom + 0.5}, Vec2(1.0 / 3.0), 0.25});
                 continue;
             }
-            const Moment part = moment_of(cut(cut(strip, 0, left, 1.0), 0, left + 1.0, -1.0));
+            const Moment part = moment_of(cut(cut(strip, 0, left, 1.0), 0, left + 1.0, -1.0), {left, bottom});
             if (part.area > 0.0)
                 visit(x, y, part);
         }
@@ -268,7 +293,8 @@ private:
         if (texel.triangle < 0)
             return;
         const auto first = 3 * static_cast<std::size_t>(texel.triangle);
-        const Vec2 point = texel.has_centroid ? texel.covered.centroid() : texel.most.centroid();
+        const Moment& part = texel.has_centroid ? texel.covered : texel.most;
+        const Vec2 point = part.centroid();
         const Vec3* p = &m_triangles.positions[first];
         const Vec2* uv = &m_triangles.texels[first];
         const Vec3 along = p[1] - p[0];
@@ -282,9 +308,17 @@ private:
         const Vec3 step_x = (along * b.y - across * a.y) / twice_area;
         const Vec3 step_y = (across * a.x - along * b.x) / twice_area;
         const double whole = glm::length(glm::cross(step_x, step_y));
-        const double scale = whole > 0.0 ? std::sqrt(std::min(texel.area / whole, 1.0)) : 1.0;
-        result.steps_x(y, x) = Vec3f(step_x * scale);
-        result.steps_y(y, x) = Vec3f(step_y * scale);
+        std::array<Vec3, 2> steps = {step_x, step_y};
+        if (texel.area < whole_fraction * whole) {
+            const std::array<Vec2, 2> shape = shape_of(part, Vec2(x, y));
+            for (std::size_t i = 0; i < 2; ++i)
+                steps[i] = step_x * shape[i].x + step_y * shape[i].y;
+            const double area = glm::length(glm::cross(steps[0], steps[1]));
+            for (Vec3& step : steps)
+                step *= area > 0.0 ? std::sqrt(texel.area / area) : 1.0;
+        }
+        result.steps_x(y, x) = Vec3f(steps[0]);
+        result.steps_y(y, x) = Vec3f(steps[1]);
 
         const Vec3 face_normal = glm::normalize(glm::cross(along, across));
         const Vec3 normal = shading_normal(first, w, face_normal);

@@ -128,6 +128,26 @@ def test_steps_of_a_texel_at_the_rim_span_its_area():
     assert not z.any()
 
 
+def test_steps_of_a_cut_texel_have_the_shape_of_its_part():
+    """Rows of points, 256 x 256 in each texel, tell area and covariance: rounding of a row is .4 % of a side."""
+    triangle = np.array([(0.3, 0.2), (4.6, 1.7), (1.4, 3.8)])
+    side = 256
+    result = texels_of(np.pad(triangle, ((0, 0), (0, 1)))[None], triangle[None], None, 5, 4)
+    places = (np.stack(np.meshgrid(*[np.arange(side)] * 2), -1).reshape(-1, 2) + 0.5) / side
+    cut = 0
+    for y, x in np.argwhere(result["covered"] > 0.05):
+        edges = np.roll(triangle, -1, 0) - triangle
+        ways = places[:, None] + (x, y) - triangle
+        inside = (edges[:, 0] * ways[..., 1] - edges[:, 1] * ways[..., 0] >= 0).all(1)
+        variance = 12 * np.cov(places[inside].T, bias=True)
+        area = inside.mean()
+        expected = variance * area / np.sqrt(np.linalg.det(variance))
+        steps = np.stack([result["steps_x"][y, x, :2], result["steps_y"][y, x, :2]], 1)
+        np.testing.assert_allclose(steps @ steps.T, expected, atol=0.02 * expected.max())
+        cut += area < 0.99
+    assert cut > 5
+
+
 def test_shading_normals_point_outward():
     triangle = np.array([[(0, 0, 0), (1, 0, 0), (0, 1, 0)]], float)
     for normal in ((0, 0, -1), (0.6, 0, -0.8), (0, 0, 0)):

@@ -38,7 +38,7 @@ constexpr float probing_size = 0.3f;
 
 // Area of a cut sample's own light over that of the whole sample, at least. Larger: cut samples are brighter where light
 // spreads about a sample, and darker where it spreads less.
-constexpr float least_own = 0.25f;
+constexpr float least_own = 0.15f;
 
 // Largest difference of the squared length of a unit vector from 1, and of the cosine of two vectors from 0.
 constexpr float unit_tolerance = 2e-3f;
