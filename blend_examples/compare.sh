@@ -1,8 +1,8 @@
 #!/usr/bin/env bash
 # Makes pictures in blend_examples/pictures: low_sun by Beamspread and by Cycles' own subsurface scattering; the scenes
-# with area lights by Beamspread and as diffuse surfaces; stage and the bodies also as volumes with Cycles' paths. Bakes
-# the examples first. On two cores Cycles takes ten minutes for low_sun, two to five for each volume, half a minute for
-# each of the others.
+# with area lights by Beamspread and as diffuse surfaces; textures also as other renderers have them; stage, the bodies
+# and a texture also as volumes with Cycles' paths. Bakes the examples first. On two cores Cycles takes ten minutes for
+# low_sun, eight for the texture, two to five for each other volume, half a minute for each of the others.
 set -euo pipefail
 here=$(cd "$(dirname "${BASH_SOURCE[0]}")" && pwd)
 root=$(dirname "$here")
@@ -32,8 +32,8 @@ for scene in soapstone shop_window soap_bar plank_floor acrylic_letters; do
     beside "$scene" "$pictures/$scene.png" "Beamspread" "$pictures/${scene}_diffuse.png" "Cycles, diffuse"
 done
 
-render stage with_volume.py "$pictures/stage_by_volume.png" \
-    "$pictures/baked/stage/Stage_floor_Milky_acrylic.exr" 384
+render stage with_volume.py "$pictures/stage_by_volume.png" "$pictures/stage_by_volume.csv" 384 \
+    "$pictures/baked/stage/Stage_floor_Milky_acrylic.exr"
 beside stage "$pictures/stage.png" "Beamspread" "$pictures/stage_by_volume.png" "Cycles, paths through the volume" \
     "$pictures/stage_diffuse.png" "Cycles, diffuse"
 
@@ -46,6 +46,16 @@ beside quail_egg "$pictures/quail_egg.png" "Beamspread: light scatters in the sp
 render inlay with_convention.py "$pictures/inlay_by_convention.png"
 beside inlay "$pictures/inlay.png" "Beamspread: light scatters in both stones" \
     "$pictures/inlay_by_convention.png" "As renderers do: light, times the texture"
+
+# Scenes of a texture beside the convention and beside Cycles' paths.
+three() { # SCENE SCRIPT SAMPLES IMAGE
+    render "$1" with_convention.py "$pictures/$1_by_convention.png"
+    render "$1" "$2" "$pictures/$1_by_volume.png" "$here/$1_paths.csv" "$3" "$pictures/baked/$1/$4.exr" \
+        "$pictures/textures/$4.exr"
+    beside "$1" "$pictures/$1.png" "Beamspread: light scatters in the texture" "$pictures/$1_by_convention.png" \
+        "As renderers do: light, times the texture" "$pictures/$1_by_volume.png" "Cycles, paths through the volume"
+}
+three printed_letters with_volume.py 160 Eye_chart_Acrylic
 
 for scene in round_soap jade_bowl marble_head paper_page paper_shade; do
     render "$scene" with_paths.py "$pictures/${scene}_by_paths.png" 128

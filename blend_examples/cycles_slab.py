@@ -113,8 +113,14 @@ def add_ghost(low, high, columns, rows):
     # which in texels that a quad's diagonal crosses moves them far along u.
     (x, y), (width, depth) = low, (high[0] - low[0], high[1] - low[1])
     corners = [(x, y, 0), (x, y + 2 * depth, 0), (x + 2 * width, y, 0)]  # normal down
-    ghost = mesh_object("Ghost", corners, [(0, 1, 2)], [(0, 0), (0, 2), (2, 0)])
+    ghost, image = make_ghost(corners, [(0, 1, 2)], [(0, 0), (0, 2), (2, 0)], columns, rows)
     ghost.location.z = GHOST_HEIGHT
+    return ghost, image
+
+
+def make_ghost(corners, faces, uvs, columns, rows):
+    """A mesh of white faces that only bakes see, and the image that its light is baked to; it alone is selected."""
+    ghost = mesh_object("Ghost", corners, faces, uvs)
     ghost.visible_camera = ghost.visible_diffuse = ghost.visible_transmission = False
     ghost.visible_volume_scatter = ghost.visible_shadow = False
     white = material("White", diffuse_nodes(1.0))

@@ -25,6 +25,7 @@ import marble_head  # noqa: E402
 import paper_page  # noqa: E402
 import paper_shade  # noqa: E402
 import plank_floor  # noqa: E402
+import printed_letters  # noqa: E402
 import quail_egg  # noqa: E402
 import round_soap  # noqa: E402
 import scene_parts as parts  # noqa: E402
@@ -108,6 +109,7 @@ def main():
         "paper_page": paper_page.build,
         "paper_shade": paper_shade.build,
         "plank_floor": plank_floor.build,
+        "printed_letters": printed_letters.build,
         "quail_egg": quail_egg.build,
         "round_soap": round_soap.build,
         "soapstone": soapstone.build,

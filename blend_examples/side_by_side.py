@@ -14,4 +14,4 @@ for index, (image, text) in enumerate(zip(images, shown[1::2])):
     left = index * (width + gap)
     figure.figimage(image, left, 0)
     figure.text((left + width / 2) / whole[0], 1 - title / 2 / whole[1], text, ha="center", va="center", fontsize=12)
-figure.savefig(picture)
+figure.savefig(picture, pil_kwargs={"optimize": True})

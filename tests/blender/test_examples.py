@@ -1,10 +1,13 @@
-"""The scenes of blend_examples/ are read whole, and baked."""
+"""The scenes of blend_examples/ are read whole, and baked; light in textures agrees with Cycles' path tracing."""
 
+import re
 from functools import partial
 from pathlib import Path
 
 import bpy
+import numpy as np
 import pytest
+import scenes
 from beamspread.blender.cycles import cycles_light
 from beamspread.blender.jobs.run.bake_plan import read_scene
 from beamspread.blender.jobs.run.batch_run import bake_all
@@ -36,6 +39,7 @@ KINDS = {
     "veined_slab": ["SunLight", "SunLight"],
     "quail_egg": ["AreaLight", "WorldLight"],
     "inlay": ["PointLight", "SunLight"],
+    "printed_letters": ["SunLight", "SunLight"],
 }
 PARTS = {"soap_bar": 1, "plank_floor": 35, "acrylic_letters": 6}
 
@@ -92,3 +96,42 @@ def test_all_open_ready_to_bake(name):
     baked = {target.object_name for target in find_bakeable(bpy.context.view_layer)}
     assert {obj.name for obj in bpy.context.selected_objects} == baked
     assert bpy.context.view_layer.objects.active.name in baked
+
+
+# Texels of the bake that the path tracing covers, and those along the side of its blocks.
+TRACED = {"printed_letters": (np.s_[:], 8)}
+# Mean error beyond the noise of the paths: of bakes, whose own noise it has, and least one of the convention.
+OFF, CONVENTION_OFF = 0.01, 0.02
+TOTAL = 0.005  # the noise of the paths' total is a tenth of it
+
+
+def traced(name):
+    """Means over blocks by Cycles' paths, (rows, columns, 3), and the part of their mean error that is noise."""
+    file = FOLDER / f"{name}_paths.csv"
+    noise = float(re.search(r"mean error of ([.0-9]+)%", file.read_text(encoding="utf-8"))[1]) / 100
+    row, column, *colors = np.loadtxt(file, delimiter=",", comments="#", skiprows=3).T
+    return np.stack(colors, -1).reshape(int(row.max()) + 1, int(column.max()) + 1, 3), noise
+
+
+def distance(values, truth, noise):
+    """Mean error beyond noise, over the mean."""
+    off = abs(values - truth).mean() / truth.mean()
+    return np.sqrt(max(off**2 - noise**2, 0))
+
+
+@pytest.mark.parametrize("name", TRACED)
+def test_light_in_textures_agrees_with_paths(name, tmp_path):
+    part, side = TRACED[name]
+    truth, noise = traced(name)
+    bpy.ops.wm.open_mainfile(filepath=str(FOLDER / f"{name}.blend"))
+    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "scene.blend"))  # the baked file lies beside it
+    obj = bpy.context.view_layer.objects.active
+    node = next(node for node in obj.active_material.node_tree.nodes if node.bl_idname == "BeamspreadNode")
+    baked = {}
+    for node.texture_method in ("SCATTERED", "MULTIPLIED"):
+        (texture,) = scenes.bake(obj)
+        rows, columns = truth.shape[:2]
+        baked[node.texture_method] = texture[part].reshape(rows, side, columns, side, 3).mean(axis=(1, 3))
+    assert abs(baked["SCATTERED"].mean() / truth.mean() - 1) < TOTAL
+    assert distance(baked["SCATTERED"], truth, noise) < OFF
+    assert distance(baked["MULTIPLIED"], truth, noise) > CONVENTION_OFF
