@@ -55,6 +55,7 @@ bake veined_slab
 bake quail_egg
 bake inlay
 bake printed_letters
+bake freckled_arm
 step "plot obstacle_cut" env PYTHONPATH="$root/build/stage" MPLBACKEND=Agg "$root/build/venv/bin/python" \
     "$here/cut_plot.py" "$pictures/baked/obstacle.json" "$here/cycles_edge.csv" "$pictures/obstacle_cut.png"
 cat "$logs/plot_obstacle_cut.log"

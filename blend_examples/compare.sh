@@ -1,8 +1,8 @@
 #!/usr/bin/env bash
 # Makes pictures in blend_examples/pictures: low_sun by Beamspread and by Cycles' own subsurface scattering; the scenes
 # with area lights by Beamspread and as diffuse surfaces; textures also as other renderers have them; stage, the bodies
-# and a texture also as volumes with Cycles' paths. Bakes the examples first. On two cores Cycles takes ten minutes for
-# low_sun, eight for the texture, two to five for each other volume, half a minute for each of the others.
+# and two textures also as volumes with Cycles' paths. Bakes the examples first. On two cores Cycles takes ten minutes for
+# low_sun, eight for each texture, two to five for each other volume, half a minute for each of the others.
 set -euo pipefail
 here=$(cd "$(dirname "${BASH_SOURCE[0]}")" && pwd)
 root=$(dirname "$here")
@@ -56,6 +56,7 @@ three() { # SCENE SCRIPT SAMPLES IMAGE
         "As renderers do: light, times the texture" "$pictures/$1_by_volume.png" "Cycles, paths through the volume"
 }
 three printed_letters with_volume.py 160 Eye_chart_Acrylic
+three freckled_arm with_volume_round.py 128 Arm_Skin
 
 for scene in round_soap jade_bowl marble_head paper_page paper_shade; do
     render "$scene" with_paths.py "$pictures/${scene}_by_paths.png" 128

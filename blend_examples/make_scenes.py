@@ -17,6 +17,7 @@ sys.path[:0] = [str(HERE), str(HERE.parent / "build" / "stage")]
 
 import acrylic_letters  # noqa: E402
 import beamspread  # noqa: E402
+import freckled_arm  # noqa: E402
 import inlay  # noqa: E402
 import jade_bowl  # noqa: E402
 import low_sun  # noqa: E402
@@ -99,6 +100,7 @@ def main():
     beamspread.register()
     scenes = {
         "acrylic_letters": acrylic_letters.build,
+        "freckled_arm": freckled_arm.build,
         "inlay": inlay.build,
         "jade_bowl": jade_bowl.build,
         "laser_beams": laser_beams,

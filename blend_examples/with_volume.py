@@ -197,7 +197,7 @@ def write(file, passes, samples):
     rows, columns = mean.shape[:2]
     lines = [
         f"# Blender {bpy.app.version_string}, Cycles volume path tracing of {Path(bpy.data.filepath).name}"
-        f" (with_volume.py, {samples} samples): exitance / pi.",
+        f" (compare.sh, {samples} samples): exitance / pi.",
         f"# {rows} x {columns} blocks of texels, rows upward; noise alone gives a mean error of"
         f" {noise_in(mean, error):.2%}.",
         "row,column,r,g,b",

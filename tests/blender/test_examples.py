@@ -40,6 +40,7 @@ KINDS = {
     "quail_egg": ["AreaLight", "WorldLight"],
     "inlay": ["PointLight", "SunLight"],
     "printed_letters": ["SunLight", "SunLight"],
+    "freckled_arm": ["SunLight", "SunLight"],
 }
 PARTS = {"soap_bar": 1, "plank_floor": 35, "acrylic_letters": 6}
 
@@ -99,10 +100,11 @@ def test_all_open_ready_to_bake(name):
 
 
 # Texels of the bake that the path tracing covers, and those along the side of its blocks.
-TRACED = {"printed_letters": (np.s_[:], 8)}
-# Mean error beyond the noise of the paths: of bakes, whose own noise it has, and least one of the convention.
-OFF, CONVENTION_OFF = 0.01, 0.02
-TOTAL = 0.005  # the noise of the paths' total is a tenth of it
+TRACED = {"printed_letters": (np.s_[:], 8), "freckled_arm": (np.s_[16:112, 24:168], 4)}
+# Mean error beyond the noise of the paths, with the noise of the bake, and error of the total, whose paths have noise
+# below .1 %. Bent textures have the bounds of tests/statistical/test_bent_textures.py, here for less contrast.
+OFF = {"printed_letters": (0.01, 0.005), "freckled_arm": (0.02, 0.01)}
+OF_CONVENTION = 0.7  # most of the convention's error
 
 
 def traced(name):
@@ -132,6 +134,7 @@ def test_light_in_textures_agrees_with_paths(name, tmp_path):
         (texture,) = scenes.bake(obj)
         rows, columns = truth.shape[:2]
         baked[node.texture_method] = texture[part].reshape(rows, side, columns, side, 3).mean(axis=(1, 3))
-    assert abs(baked["SCATTERED"].mean() / truth.mean() - 1) < TOTAL
-    assert distance(baked["SCATTERED"], truth, noise) < OFF
-    assert distance(baked["MULTIPLIED"], truth, noise) > CONVENTION_OFF
+    off = distance(baked["SCATTERED"], truth, noise)
+    assert off < OFF[name][0]
+    assert off < OF_CONVENTION * distance(baked["MULTIPLIED"], truth, noise)
+    assert abs(baked["SCATTERED"].mean() / truth.mean() - 1) < OFF[name][1]
