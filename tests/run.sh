@@ -77,7 +77,7 @@ in_bpy_without_long() {
     local name cases ignored=()
     for name in "${long_in_bpy[@]}"; do ignored+=("--ignore=tests/blender/$name.py"); done
     cases=$(printf ' or (%s)' "${long_cases_in_bpy[@]}")
-    in_bpy "${ignored[@]}" -k "not (${cases# or })"
+    in_bpy "${ignored[@]}" -k "not (${cases# or })" "$@"
 }
 
 skipped() { printf 'SKIPPED  %s\n' "$*" >>"$summary"; }
@@ -133,12 +133,14 @@ step "the zip" cmake --build build/release --target package
 # its end; it gets some of Blender's tests, so that both take about as long.
 moved=(tests/blender/test_batch.py tests/blender/test_curves.py tests/blender/test_read_world.py)
 beside=$(mktemp)
+chosen=()
+[ $all = 1 ] || chosen=(-m "not long")
 {
-    step "tests" in_venv
-    if [ $all = 1 ]; then step "tests in bpy 4.5" in_bpy; else step "tests in bpy 4.5" in_bpy_without_long; fi
-    step "some of those in Blender" in_blender "${moved[@]}"
+    step "tests" in_venv "${chosen[@]}"
+    if [ $all = 1 ]; then step "tests in bpy 4.5" in_bpy; else step "tests in bpy 4.5" in_bpy_without_long "${chosen[@]}"; fi
+    step "some of those in Blender" in_blender "${chosen[@]}" "${moved[@]}"
 } >"$beside" 2>&1 &
-step "tests in Blender" in_blender "${moved[@]/#/--ignore=}"
+step "tests in Blender" in_blender "${chosen[@]}" "${moved[@]/#/--ignore=}"
 step "the zip in Blenders" env ZIP="$(echo build/release/beamspread-*.zip)" tests/matrix.sh "${matrix[@]}"
 wait
 cat "$beside"
@@ -146,7 +148,7 @@ rm -f "$beside"
 if [ $all = 1 ]; then
     step "wheel" tests/wheel.sh
 else
-    skipped "clang-tidy, sanitizers, Live, bodies and most comparisons with Cycles in bpy 4.5, the wheel, the zip in Blender 4.2, 5.0, Debian 13's"
-    skipped "and Debian unstable's: tests/run.sh --all has them"
+    skipped "the tests of tests/long_tests.txt, clang-tidy, sanitizers, Live, bodies and most comparisons with Cycles in bpy 4.5,"
+    skipped "the wheel, the zip in Blender 4.2, 5.0, Debian 13's and Debian unstable's: tests/run.sh --all has them"
 fi
 finish
