@@ -7,6 +7,7 @@
 #include "bake/bent_bake.h"
 #include "bake/canvas.h"
 #include "bake/canvas_light.h"
+#include "bake/entering.h"
 #include "bake/field_bake.h"
 #include "bake/stored_light.h"
 #include "base/threads.h"
@@ -62,11 +63,27 @@ void bake_stored(const Canvas& canvas, const std::vector<CanvasLight>& lights, c
     }
 }
 
+std::vector<CanvasLight> on_canvas(const Canvas& canvas, const std::vector<ArrivingLights>& lights)
+{
+    std::vector<CanvasLight> on_patches;
+    for (std::size_t l = 0; l < lights.front().size(); ++l) {
+        std::vector<const SurfaceLight*> parts;
+        for (const Patch& patch : canvas.patches) {
+            const std::optional<SurfaceLight>& light = lights[patch.index][l];
+            parts.push_back(light ? &*light : nullptr);
+        }
+        if (std::ranges::any_of(parts, [](const SurfaceLight* part) { return part != nullptr; }))
+            on_patches.emplace_back(canvas, std::move(parts));
+    }
+    return on_patches;
+}
+
 // Luminance of a canvas without the color of light that leaves its surfaces.
-void bake_canvas(const Canvas& canvas, const std::vector<CanvasLight>& lights, const BakeOptions& options,
+void bake_canvas(const Canvas& canvas, const std::vector<ArrivingLights>& arriving, const BakeOptions& options,
                  Problem problem, Progress& progress, float* luminance)
 {
     problem.plane = canvas.plane;
+    const std::vector<CanvasLight> lights = on_canvas(canvas, arriving);
     const bool all_have_one = std::ranges::all_of(lights, &CanvasLight::has_one_direction);
     const bool fits = lights.size() * canvas.samples() * sizeof(float) <= options.max_stored_bytes;
     if (options.solver != Solver::fft || (all_have_one && fits))
@@ -81,21 +98,6 @@ void add_part(const RayNoise& part, double share, RayNoise& noise)
 {
     noise.irradiance += share * part.irradiance;
     noise.variance += share * part.variance;
-}
-
-std::vector<CanvasLight> on_canvas(const Canvas& canvas, const std::vector<ArrivingLights>& lights)
-{
-    std::vector<CanvasLight> on_patches;
-    for (std::size_t l = 0; l < lights.front().size(); ++l) {
-        std::vector<const SurfaceLight*> parts;
-        for (const Patch& patch : canvas.patches) {
-            const std::optional<SurfaceLight>& light = lights[patch.index][l];
-            parts.push_back(light ? &*light : nullptr);
-        }
-        if (std::ranges::any_of(parts, [](const SurfaceLight* part) { return part != nullptr; }))
-            on_patches.emplace_back(canvas, std::move(parts));
-    }
-    return on_patches;
 }
 
 // Copies the texels of a patch.
@@ -164,7 +166,14 @@ void bake_surfaces(const std::vector<Surface>& surfaces, const std::vector<Arriv
         values.resize(is_surface ? 0 : canvas.samples() * channels.size());
         float* const result = is_surface ? luminance[first] : values.data();
         progress.advance_by(static_cast<double>(canvas.samples()), [&](Progress& part) {
-            bake_canvas(canvas, on_canvas(canvas, lights), of_canvas, problem, part, result);
+            if (options.solver == Solver::fft) {
+                const EnteringColors entering(canvas);
+                Problem colored = problem;
+                colored.entering = entering.factors();
+                bake_canvas(entering.canvas(), lights, of_canvas, std::move(colored), part, result);
+            } else {
+                bake_canvas(canvas, lights, of_canvas, problem, part, result);
+            }
         });
         for (const Patch& patch : canvas.patches) {
             if (!is_surface)

@@ -3,6 +3,7 @@
 #include <array>
 #include <cmath>
 #include <cstdint>
+#include <optional>
 #include <string>
 #include <tuple>
 #include <utility>
@@ -63,11 +64,19 @@ std::vector<HeldLight> lights_of(const Plane2D& irradiance, const Array<float>& 
     return held;
 }
 
+const float* entering_of(const Array<float>& factors, const Problem& problem)
+{
+    if (factors.ndim() != 3 || side(factors, 0) != problem.plane.height || side(factors, 1) != problem.plane.width ||
+        side(factors, 2) != problem.channels.size())
+        reject("entering", shape_text(factors), "(H, W, C) like the luminance");
+    return factors.data();
+}
+
 Array<float> convolve(const Lights& lights, const Sources& ldf, const std::vector<double>& albedo,
                       const std::vector<double>& mean_free_path, std::array<double, 2> pitch, const std::string& solver,
                       double tolerance, int threads, const py::object& progress, std::size_t memory,
                       std::size_t coarsening, const std::string& side,
-                      const std::vector<std::array<std::size_t, 4>>& parts)
+                      const std::vector<std::array<std::size_t, 4>>& parts, const std::optional<Array<float>>& entering)
 {
     Problem problem = problem_of(lights, ldf, albedo, mean_free_path, pitch, tolerance, side);
     for (const auto& [y, x, height, width] : parts) {
@@ -81,6 +90,8 @@ Array<float> convolve(const Lights& lights, const Sources& ldf, const std::vecto
     problem.threads = threads;
     problem.memory = memory;
     problem.coarsening = coarsening;
+    if (entering)
+        problem.entering = entering_of(*entering, problem);
     Progress report(progress_callback(progress));
     Array<float> luminance({problem.plane.height, problem.plane.width, problem.channels.size()});
     float* data = luminance.mutable_data();
@@ -139,6 +150,7 @@ color : sequence of float
           py::arg("pitch"), py::arg("solver"), py::arg("tolerance"), py::arg("threads"), py::arg("progress"),
           py::arg("memory") = Problem().memory, py::arg("coarsening") = Problem().coarsening,
           py::arg("side") = "reflected", py::arg("parts") = std::vector<std::array<std::size_t, 4>>(),
+          py::arg("entering") = py::none(),
           R"(Luminance of lights on a grid; the engine behind `beamspread.convolve`.
 
 C libraries, albedos and mean free paths (metres), pitch (x, y) in metres; returns float32 (H, W, C) in W/(m^2 sr).
@@ -147,6 +159,7 @@ C libraries, albedos and mean free paths (metres), pitch (x, y) in metres; retur
 0 for what costs least.
 `side`: of the luminance, 'reflected' where light enters or 'transmitted' at the same texels of a slab's far side.
 `parts`: (row, column, height, width) of each part of a divided plane, on which the solver 'fft' keeps light.
+`entering`: float32 (H, W, C), factors by which all light enters, for the solver 'fft'; None: 1.
 )");
     m.def("adaptive_beams", &adaptive_beams, py::arg("light"), py::arg("tolerance"),
           R"(Squares that the adaptive solver lights by one beam each; the engine behind `beamspread.adaptive_beams`.

@@ -58,6 +58,42 @@ def test_fft_equals_direct_where_spectra_are_tabulated(library, angle, mean_free
     assert worst < 7e-5
 
 
+@pytest.mark.parametrize("coarsening", [1, 4])
+@pytest.mark.parametrize("lights", ["sun", "lamp", "both", "colored"])
+@pytest.mark.parametrize("are_alike", [False, True])
+def test_factors_of_light_that_enters_are_those_of_the_light(library, lights, coarsening, are_alike):
+    """To the rounding of sums: small planes keep all terms. Channels are spread one by one, or in common."""
+    rng = np.random.default_rng(5)
+    shape = 60, 70
+    factors = rng.random((*shape, 3), np.float32)
+    if are_alike:
+        factors[...] = factors[..., :1]
+    way = lamp_directions(*shape).astype(np.float32)
+    colors = {"sun": (1.0, 0.5, 2.0), "lamp": (0.3, 0.2, 0.0) if lights == "colored" else (2.0, 1.0, 4.0)}
+    known = {"sun": (rng.random(shape, np.float32), np.float32(travel(40, 20))), "lamp": (-way[..., 2], way)}
+    names = [lights] if lights in known else list(known)
+    gray = [_native.PlaneLight(*known[name], colors[name]) for name in names]
+    colored = [
+        _native.PlaneLight(known[name][0] * factors[..., c], known[name][1], colors[name][c] * np.eye(3)[c])
+        for name in names
+        for c in range(3)
+    ]
+    rest = [library] * 3, ALBEDO, (3.0, 2.0, 1.0), (1.0, 1.0), "fft", 1e-3, 0, None
+    found = _native.convolve(gray, *rest, coarsening=coarsening, entering=factors)
+    expected = _native.convolve(colored, *rest, coarsening=coarsening)
+    assert found == pytest.approx(expected, rel=1e-5, abs=3e-6 * expected.max())
+
+
+def test_factors_of_light_that_enters_are_checked(library):
+    light = [_native.PlaneLight(np.ones((8, 9), np.float32), np.float32(travel(40)), [1, 1, 1])]
+    rest = [library] * 3, ALBEDO, (1.0,) * 3, (1.0, 1.0)
+    for factors in (np.ones((8, 9)), np.ones((9, 8, 3)), np.full((8, 9, 3), -1.0), np.full((8, 9, 3), np.nan)):
+        with pytest.raises(ValueError, match="argument 'entering'"):
+            _native.convolve(light, *rest, "fft", 1e-3, 0, None, entering=np.float32(factors))
+    with pytest.raises(ValueError, match="argument 'entering'"):
+        _native.convolve(light, *rest, "direct", 1e-3, 0, None, entering=np.ones((8, 9, 3), np.float32))
+
+
 @pytest.fixture(scope="module")
 def thin():
     """The beam's images in its sides are sharper than texels up to far from where it enters."""

@@ -120,11 +120,18 @@ import numpy as np
 from bakes import SETTINGS, bake, square
 from beamspread.core.material import Material
 from beamspread.core.scene.illumination import Illumination
-from beamspread.core.scene.lights import PointLight, SunLight
+from beamspread.core.scene.lights import PointLight, SunLight, WorldLight
 
-kind, texture, side = {light!r}, {texture!r}, {side}
+texture, side = {texture!r}, {side}
 common = "Light", 1.0, (1.0, 1.0, 1.0), True
-light = SunLight(*common, (0.6, 0.0, -0.8)) if kind == "sun" else PointLight(*common, (0.0, 0.0, 0.3))
+clouds = np.random.default_rng(0).random((64, 128, 1), np.float32).repeat(3, axis=-1)
+axes = (1, 0, 0), (0, 1, 0), (0, 0, 1)
+made = {{
+    "sun": SunLight(*common, (0.6, 0.0, -0.8)),
+    "lamp": PointLight(*common, (0.0, 0.0, 0.3)),
+    "sky": WorldLight(*common, clouds, axes),
+}}
+light = made[{light!r}]
 y, x = np.mgrid[:side, :side]
 veins = (0.87 + 0.12 * np.abs(np.sin(0.05 * x + np.sin(0.035 * y))))[..., None] * (1, 0.98, 0.95)
 veins = veins.astype(np.float32)
@@ -155,14 +162,13 @@ print((status("VmHWM") - before) / (4 * side**2))
 
 
 @pytest.mark.skipif(not Path("/proc/self/clear_refs").exists(), reason="peaks are read as Linux tells them")
-@pytest.mark.parametrize(("light", "other"), [("sun", "none"), ("lamp", "multiplied")])
-def test_an_albedo_of_each_texel_takes_few_planes(light, other):
-    """At most 12 planes of floats, one for each texel, of which the map has three. Beyond a bake of one albedo; under a
-    lamp beyond one of a texture that multiplies light, which has moments for each channel, too.
-    """
+@pytest.mark.parametrize("texture", ["scattered", "multiplied"])
+@pytest.mark.parametrize("light", ["sun", "lamp", "sky"])
+def test_colors_of_each_texel_take_few_planes(light, texture):
+    """At most 12 planes of floats, one for each texel, beyond a bake of one color; the map has three of them."""
     peaks = []
-    for texture in (other, "scattered"):
-        code = PLANES.format(tests=str(Path(__file__).parents[1]), light=light, texture=texture, side=1024)
+    for used in ("none", texture):
+        code = PLANES.format(tests=str(Path(__file__).parents[1]), light=light, texture=used, side=1024)
         done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
         peaks.append(float(done.stdout))
     assert peaks[1] - peaks[0] < 12

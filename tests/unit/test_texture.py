@@ -53,6 +53,30 @@ def test_light_comes_in_by_the_color_of_each_texel(grid, light, solver):
 
 
 @pytest.mark.parametrize("light", LIGHTS)
+def test_mirror_images_let_in_the_same_colors(grid, light):
+    parts = RANDOM.random((SIZE, SIZE, 3), np.float32)
+    mirrored = replace(grid, mirrored=0.3)
+    found = luminance(replace(mirrored, color_in=parts), light)
+    for channel in range(3):
+        covered = luminance(replace(mirrored, coverage=parts[..., channel].copy()), light)[..., channel]
+        assert found[..., channel] == pytest.approx(covered, rel=1e-3, abs=1e-3 * covered.max())
+
+
+@pytest.mark.parametrize("light", LIGHTS)
+def test_light_that_a_slab_returns_unscattered_has_the_color_of_where_it_entered(grid, light):
+    parts = RANDOM.random((SIZE, SIZE, 3), np.float32)
+    slab = replace(MATERIAL, ior=1.4), 0.04
+
+    def on_slab(changed):
+        return bake(changed, Illumination([LIGHTS[light]]), *slab, SETTINGS)
+
+    found = on_slab(replace(grid, color_in=parts))
+    for channel in range(3):
+        covered = on_slab(replace(grid, coverage=parts[..., channel].copy()))[..., channel]
+        assert found[..., channel] == pytest.approx(covered, rel=1e-3, abs=1e-3 * covered.max())
+
+
+@pytest.mark.parametrize("light", LIGHTS)
 def test_grey_is_the_same_in_every_channel(grid, light):
     grey = np.repeat(RANDOM.random((SIZE, SIZE, 1), np.float32), 3, axis=2)
     covered = luminance(replace(grid, coverage=grey[..., 0].copy()), light)

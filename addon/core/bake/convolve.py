@@ -222,7 +222,11 @@ def convolve_lights(
     arriving = [(_irradiance(values), float_array("direction", direction)) for values, direction in lights]
     sources, paths = _sources(ldf, interpolation), _rgb("mean_free_path", mean_free_path)
 
-    def solve(lights: Lights, albedos: Sequence[float], part: Callback | None) -> NDArray[np.float32]:
+    def solve(
+        lights: Lights, albedos: Sequence[float], part: Callback | None, factors: NDArray[np.float32] | None = None
+    ) -> NDArray[np.float32]:
+        if factors is not None and solver != "fft":
+            lights, factors = [(values * factors, direction) for values, direction in lights], None
         return native.convolve(
             [light for values, direction in lights for light in native.PlaneLight.of_channels(values, direction, 3)],
             sources,
@@ -234,6 +238,7 @@ def convolve_lights(
             int(threads),
             part,
             side=side,
+            entering=factors,
         )
 
     if not is_map(albedo):

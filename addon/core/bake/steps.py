@@ -39,7 +39,7 @@ Peaks of processes with 256^2 to 2048^2 texels (tests/unit/test_memory.py), roun
 OTHER_SOLVER = BYTES["direct"]
 """The same of a solver that is not listed: the most that a listed one takes per texel."""
 
-TEXTURED_BYTES = 60e6, 200
+TEXTURED_BYTES = 60e6, 100
 """The same that textures take in addition in which light scatters: albedos, factors, directions, paths."""
 
 BENT_BYTES = 400e6, 2500

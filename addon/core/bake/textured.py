@@ -35,8 +35,8 @@ SOLVER_PART = 0.3
 """Fraction of the time that the convention takes."""
 
 Lights = Sequence[tuple[NDArray[np.float32], NDArray[np.float32]]]
-Solve = Callable[[Lights, Sequence[float], Progress], NDArray[np.float32]]
-"""Takes lights, the albedo of each channel and the progress; luminance (H, W, 3)."""
+Solve = Callable[[Lights, Sequence[float], Progress, NDArray[np.float32]], NDArray[np.float32]]
+"""Luminance (H, W, 3) by lights, the albedo of each channel, the progress, and factors (H, W, 3) of entering light."""
 
 
 def is_map(albedo: object) -> bool:
@@ -76,7 +76,7 @@ def textured_luminance(
         channel = Convention.of([table.reflectance(albedos[..., c])], table)
         factors[..., c] = channel.factors[0]
         means.append(channel.albedo)
-    result = convention([(light * factors, way) for light, way in lights], means, solving)
+    result = convention(lights, means, solving, factors)
     result *= factors
     plane = TexturedPlane(sources, albedos, factors, means, mean_free_path, pitch)
     worst = plane.correct(result, beams_of(map(gathered, lights)), side, noise, MAX_WALKS, threads, correcting)

@@ -53,16 +53,22 @@ def with_factors(grids: Sequence[AnyGrid], material: Material, sources: Sequence
     """
     if all(grid.base_color is None and grid.albedo is None for grid in grids):
         return list(grids), material
-    channels = []
+    # Made before the arrays of each channel, whose memory would otherwise stay below them.
+    factors = [np.empty((*grid.coverage.shape, 3), np.float32) for grid in grids]
+    albedos = [grid.albedo if _is_known(grid) else np.empty_like(factor) for grid, factor in zip(grids, factors)]
+    means = []
     for c, source in enumerate(sources):
-        table = reflectance_table(source)
-        channels.append(_channel(grids, c, table))
-    changed = []
-    for number, grid in enumerate(grids):
-        albedo = grid.albedo if _is_known(grid) else np.stack([albedos[number] for albedos, _ in channels], -1)
-        factor = np.stack([convention.factors[number] for _, convention in channels], -1)
-        changed.append(replace(grid, albedo=albedo, base_color=None, color_in=factor, color_out=factor))
-    return changed, replace(material, albedo=tuple(convention.albedo for _, convention in channels))
+        found, convention = _channel(grids, c, reflectance_table(source))
+        for number, values in found.items():
+            albedos[number][..., c] = values
+        for factor, values in zip(factors, convention.factors):
+            factor[..., c] = values
+        means.append(convention.albedo)
+    changed = [
+        replace(grid, albedo=albedo, base_color=None, color_in=factor, color_out=factor)
+        for grid, albedo, factor in zip(grids, albedos, factors)
+    ]
+    return changed, replace(material, albedo=tuple(means))
 
 
 def _is_known(grid: AnyGrid) -> bool:

@@ -195,7 +195,7 @@ Grid term_light(const LightTerms& terms, std::size_t t)
     parallel_for(grid.height, [&](std::size_t y) {
         TermRow row;
         row.start(terms, {y, 0, grid.width}, t, 1);
-        std::copy_n(row.values(t), grid.width, grid.row(y));
+        std::copy_n(row.values(), grid.width, grid.row(y));
     });
     return grid;
 }

@@ -33,12 +33,13 @@ void check_direction(const Vec3& d)
         reject("direction", "with z = " + std::to_string(d.z), "z < 0: light travels toward the surface");
 }
 
-void check_row(const PlaneLight& light, std::size_t y)
+// `entering`: largest factor of light that enters.
+void check_row(const PlaneLight& light, std::size_t y, float entering)
 {
     const auto* field = std::get_if<PerTexel>(&light.directions);
     for (std::size_t x = 0; x < light.irradiance.width; ++x) {
         const float irradiance = light.irradiance(y, x);
-        if (!(irradiance >= 0.0f && irradiance <= max_irradiance))
+        if (!(irradiance >= 0.0f && irradiance <= max_irradiance / entering))
             reject("irradiance", static_cast<double>(irradiance), "0 to 1e30 W/m^2");
         if (field != nullptr && irradiance > 0.0f) {
             const float* d = field->travel + 3 * (y * light.irradiance.width + x);
@@ -47,7 +48,7 @@ void check_row(const PlaneLight& light, std::size_t y)
     }
 }
 
-void check_light(const Plane& plane, std::size_t channels, const PlaneLight& light)
+void check_light(const Plane& plane, std::size_t channels, const PlaneLight& light, float entering)
 {
     const View2D<const float>& irradiance = light.irradiance;
     if (irradiance.width != plane.width || irradiance.height != plane.height)
@@ -62,7 +63,23 @@ void check_light(const Plane& plane, std::size_t channels, const PlaneLight& lig
         check_direction(parallel->travel);
     if (const auto* point = std::get_if<FromPoint>(&light.directions); point != nullptr && !(point->position.z > 0.0))
         reject("position", point->position.z, "above the plane");
-    parallel_for(irradiance.height, [&](std::size_t y) { check_row(light, y); });
+    parallel_for(irradiance.height, [&](std::size_t y) { check_row(light, y, entering); });
+}
+
+// The largest factor of light that enters, at least 1.
+float checked_entering(const Problem& problem)
+{
+    float most = 1.0f;
+    const std::size_t count = problem.entering ? problem.plane.texels() * problem.channels.size() : 0;
+    for (std::size_t i = 0; i < count; ++i) {
+        const float factor = problem.entering[i];
+        if (!(factor >= 0.0f && factor <= max_irradiance))
+            reject("entering", static_cast<double>(factor), "0 to 1e30");
+        most = std::max(most, factor);
+    }
+    if (problem.entering && problem.solver != Solver::fft)
+        reject("entering", "factors", "none for solvers other than 'fft'");
+    return most;
 }
 
 // Largest relative difference of proportional colours. Quotients of single-precision colours are off by up to 1.2e-7.
@@ -79,6 +96,17 @@ double common_factor(const std::vector<std::vector<double>>& colors, std::size_t
         if (std::abs(color[channel] - factor * color[reference]) > same_color * color[channel])
             return 0.0;
     return factor;
+}
+
+// True if light of two channels enters by the same factors at all texels.
+bool enter_alike(const Problem& problem, std::size_t channel, std::size_t reference)
+{
+    const std::size_t channels = problem.channels.size();
+    const std::size_t count = problem.entering ? problem.plane.texels() * channels : 0;
+    for (std::size_t i = 0; i < count; i += channels)
+        if (problem.entering[i + channel] != problem.entering[i + reference])
+            return false;
+    return true;
 }
 
 }  // namespace
@@ -113,11 +141,12 @@ void validate(const Problem& problem)
     }
     if (problem.lights.empty() && problem.coming.survey.empty())
         reject("lights", "empty", "at least one light");
+    const float entering = checked_entering(problem);
     for (const auto* lights : {&problem.lights, &problem.coming.examples})
         for (const PlaneLight& light : *lights)
-            check_light(plane, problem.channels.size(), light);
+            check_light(plane, problem.channels.size(), light, entering);
     for (const SurveyedLight& surveyed : problem.coming.survey)
-        check_light(surveyed.plane, problem.channels.size(), surveyed.light);
+        check_light(surveyed.plane, problem.channels.size(), surveyed.light, entering);
 }
 
 ChannelSets::ChannelSets(const Problem& problem)
@@ -131,14 +160,18 @@ ChannelSets::ChannelSets(const Problem& problem)
     for (std::size_t c = 0; c < problem.channels.size(); ++c) {
         double factor = 0.0;
         std::size_t set = 0;
+        Source source{m_reference.size(), 1.0};
         while (set < m_reference.size()) {
             factor = common_factor(colors, c, m_reference[set]);
-            if (factor != 0.0)
+            if (factor != 0.0 && enter_alike(problem, c, m_reference[set]))
                 break;
+            if (factor != 0.0 && source.set == m_reference.size())
+                source = {set, factor};
             ++set;
         }
         if (set == m_reference.size()) {
             m_reference.push_back(c);
+            m_sources.push_back(source);
             factor = 1.0;
         }
         const auto known = std::find(media.begin(), media.end(), problem.channels[c]);
@@ -153,6 +186,15 @@ ChannelSets::ChannelSets(const Problem& problem)
         else
             shared->members.push_back({c, factor});
     }
+}
+
+std::vector<std::size_t> ChannelSets::results_of(std::size_t set) const
+{
+    std::vector<std::size_t> of_set;
+    for (std::size_t r = 0; r < results.size(); ++r)
+        if (results[r].set == set)
+            of_set.push_back(r);
+    return of_set;
 }
 
 void clip_negative(float* values, std::size_t count)

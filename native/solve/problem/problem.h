@@ -158,6 +158,9 @@ struct Problem {
     std::size_t coarsening = 0;  // texels per node of the coarse grid of solver `fft`; 1: no such grid, 0: the fastest
     ComingLight coming{};
     std::size_t max_moment_bytes = 0;  // bytes of moments of coming light; 0: any
+    // Solver `fft`: factors of all light where it enters, [texel][channel]; null: 1. Lights that channels share stay
+    // shared, and one channel after the other is colored and spread.
+    const float* entering = nullptr;
 };
 
 // Throws InvalidArgument for a plane, media, light or options that solvers don't cover.
@@ -168,7 +171,8 @@ void clip_negative(float* values, std::size_t count);
 
 // Sets of channels with proportional light: each channel's light is a factor times that of its set. Lights of one
 // colour make one set, lights of different colours at most one per channel. Channels of one set and medium share a
-// result.
+// result. Channels of different factors of entering light are in different sets, whose light is proportional until it
+// enters.
 struct ChannelSets {
     struct Member {
         std::size_t channel;
@@ -188,11 +192,24 @@ struct ChannelSets {
     std::size_t channel(std::size_t set) const { return m_reference[set]; }
     double color(const PlaneLight& light, std::size_t set) const { return light.color[m_reference[set]]; }
 
+    // The results of a set, ascending.
+    std::vector<std::size_t> results_of(std::size_t set) const;
+
+    // The first set whose light is proportional until it enters, and the factor of this set's light to it.
+    std::size_t source(std::size_t set) const { return m_sources[set].set; }
+    double source_factor(std::size_t set) const { return m_sources[set].factor; }
+
     std::vector<ChannelMedium> media;
     std::vector<Result> results;
 
 private:
+    struct Source {
+        std::size_t set;
+        double factor;
+    };
+
     std::vector<std::size_t> m_reference;  // [set]
+    std::vector<Source> m_sources;  // [set]
 };
 
 }  // namespace beamspread

@@ -125,7 +125,9 @@ struct Strip {
     std::vector<float> values;
 };
 
-Strip strip_from(std::size_t first, const Plane& plane, const PlaneLight& light, const ExitTable& exits)
+// `entering`: [texel], every `stride`th value; null: 1.
+Strip strip_from(std::size_t first, const Plane& plane, const PlaneLight& light, const ExitTable& exits,
+                 const float* entering, std::size_t stride)
 {
     const std::size_t last = std::min(plane.height, first + rows_per_strip);
     const double reach = static_cast<double>(exits.max_distance()) / plane.pitch_y + 1.0;
@@ -138,6 +140,8 @@ Strip strip_from(std::size_t first, const Plane& plane, const PlaneLight& light,
     for (std::size_t y = first; y < last; ++y) {
         if (!row.read(plane, light, {y, 0, plane.width}))
             continue;
+        for (std::size_t x = 0; x < plane.width && entering; ++x)
+            row.irradiance[x] *= entering[(y * plane.width + x) * stride];
         for (std::size_t x = 0; x < plane.width; ++x) {
             if (row.irradiance[x] == 0.0f)
                 continue;
@@ -164,8 +168,9 @@ void add_unscattered(const Problem& problem, const PlaneLight& light, float* lum
         if (exits.count() == 0 || light.color[c] == 0.0)
             continue;
         const auto factor = static_cast<float>(light.color[c]);
+        const float* const entering = problem.entering ? problem.entering + c : nullptr;
         parallel_ordered((plane.height + rows_per_strip - 1) / rows_per_strip, [&](std::size_t item) {
-            return [&, done = strip_from(item * rows_per_strip, plane, light, exits)] {
+            return [&, done = strip_from(item * rows_per_strip, plane, light, exits, entering, channels)] {
                 float* out = luminance + done.first_row * plane.width * channels + c;
                 for (std::size_t i = 0; i < done.values.size(); ++i)
                     out[i * channels] += factor * done.values[i];
@@ -186,7 +191,8 @@ struct UnscatteredRays::Exits {
     std::vector<ExitTable> tables;  // [channel]
 };
 
-UnscatteredRays::UnscatteredRays(const Problem& problem) : m_plane(problem.plane), m_exits(std::make_unique<Exits>())
+UnscatteredRays::UnscatteredRays(const Problem& problem)
+    : m_plane(problem.plane), m_entering(problem.entering), m_exits(std::make_unique<Exits>())
 {
     // Smallest and largest angle of the survey; rays outside count as at these.
     std::pair<float, float> angles{1.0f, 0.0f};
@@ -211,6 +217,9 @@ UnscatteredRays::UnscatteredRays(const Problem& problem) : m_plane(problem.plane
         std::ranges::for_each(*lights, add_brightest);
     for (const SurveyedLight& surveyed : problem.coming.survey)
         add_brightest(surveyed.light);
+    const std::size_t factors = m_entering ? m_plane.texels() * problem.channels.size() : 0;
+    if (factors > 0)
+        max_irradiance *= static_cast<double>(std::max(*std::max_element(m_entering, m_entering + factors), 1.0f));
     m_unit = std::ldexp(max_irradiance > 0.0 ? max_irradiance : 1.0, -fraction_bits);
     if (count > 0)
         m_sums.resize(m_plane.texels() * problem.channels.size());
@@ -231,7 +240,9 @@ void UnscatteredRays::add(const RayRow& rays, const std::vector<double>& color)
             across > 0.0 ? Vec2(travel.x / m_plane.pitch_x, travel.y / m_plane.pitch_y) / across : Vec2(0.0);
         for (std::size_t c = 0; c < channels; ++c) {
             const ExitTable& exits = m_exits->tables[c];
-            const double irradiance = color[c] * static_cast<double>(rays.irradiance[x * channels + c]);
+            const std::size_t texel_channel = (rays.y * m_plane.width + rays.x + x) * channels + c;
+            const double entering = m_entering ? static_cast<double>(m_entering[texel_channel]) : 1.0;
+            const double irradiance = entering * color[c] * static_cast<double>(rays.irradiance[x * channels + c]);
             for (std::size_t k = 0; k < exits.count() && irradiance > 0.0; ++k) {
                 const auto [distance, power] = exits.at(k, static_cast<float>(half_tangent));
                 const double exitance = irradiance * static_cast<double>(power) * inv_pi / m_unit;

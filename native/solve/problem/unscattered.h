@@ -33,6 +33,7 @@ private:
     struct Exits;
 
     Plane m_plane;
+    const float* m_entering;  // as of `Problem`
     std::unique_ptr<Exits> m_exits;
     double m_unit;                     // of the sums, W/(m^2 sr)
     std::vector<std::int64_t> m_sums;  // [texel][channel]

@@ -62,9 +62,10 @@ void add_direction(LightTerms& terms, const Vec3& travel, const std::vector<std:
         profile.reach = profile.profile.reach(std::min(beyond, max_beyond)) * medium.mean_free_path;
         terms.profiles.push_back(std::move(profile));
     }
-    const bool alone = lights.size() == 1;
+    const bool alone = lights.size() == 1 && !terms.have_sets_apart();
     for (std::size_t set = 0; set < (alone ? 1 : terms.sets.count()); ++set) {
         LightTerm term;
+        term.set = set;
         for (const std::size_t l : lights)
             term.fixed.push_back({l, alone ? 1.0f : static_cast<float>(terms.sets.color(terms.fixed[l], set))});
         for (const ChannelSets::Result& result : terms.sets.results) {
@@ -93,7 +94,7 @@ void add_basis(LightTerms& terms, LowRankBasis basis)
         const auto& [m, rank] = terms.basis.functions[f];
         for (const Phase phase : {Phase::cosine, Phase::sine})
             for (std::size_t set = 0; set < terms.sets.count() && (m > 0 || phase == Phase::cosine); ++set) {
-                LightTerm term{{}, f, phase, set, {}};
+                LightTerm term{{}, f, phase, set, {}, terms.terms.size() - set + terms.sets.source(set)};
                 for (const ChannelSets::Result& result : terms.sets.results) {
                     term.kernels.emplace_back();
                     if (result.set == set)
@@ -121,21 +122,25 @@ MomentPlanes::MomentPlanes(const std::vector<LightTerm>& terms, std::size_t texe
                            const std::function<void()>& advance)
     : m_texels(texels)
 {
-    const auto count = static_cast<std::size_t>(std::ranges::count_if(terms, &LightTerm::is_moment));
+    for (std::size_t t = 0; t < terms.size(); ++t)
+        if (terms[t].is_moment() && terms[t].source == t)
+            m_own.push_back(t);
     // Planes a power of two apart would share few lines of the cache.
     const std::size_t stride = (texels + texels_apart - 1) / texels_apart * texels_apart + texels_apart;
-    m_data = HugePages<float>(count * stride);
-    float* next = m_data.data();
-    for (const LightTerm& term : terms)
-        m_planes.push_back(term.is_moment() ? std::exchange(next, next + stride) : nullptr);
+    m_data = HugePages<float>(m_own.size() * stride);
+    m_planes.resize(terms.size());
+    for (std::size_t i = 0; i < m_own.size(); ++i)
+        m_planes[m_own[i]] = m_data.data() + i * stride;
+    for (std::size_t t = 0; t < terms.size(); ++t)
+        if (terms[t].is_moment())
+            m_planes[t] = m_planes[terms[t].source];
     clear(advance);
 }
 
 void MomentPlanes::clear(const std::function<void()>& advance)
 {
-    parallel_for(m_planes.size(), [&](std::size_t term) {
-        if (m_planes[term])
-            std::fill_n(m_planes[term], m_texels, 0.0f);
+    parallel_for(m_own.size(), [&](std::size_t i) {
+        std::fill_n(m_planes[m_own[i]], m_texels, 0.0f);
         if (advance)
             advance();
     });
@@ -143,7 +148,17 @@ void MomentPlanes::clear(const std::function<void()>& advance)
 
 LightTerms light_terms(const Problem& problem, double beyond, const TermChoice& choose)
 {
-    LightTerms result{problem.plane, ChannelSets(problem), {}, {}, {}, {}, {}, {}, {}};
+    LightTerms result{.plane = problem.plane,
+                      .sets = ChannelSets(problem),
+                      .fixed = {},
+                      .changing = {},
+                      .colors = {},
+                      .basis = {},
+                      .terms = {},
+                      .profiles = {},
+                      .moments = {},
+                      .entering = problem.entering,
+                      .channels = problem.channels.size()};
     for (const PlaneLight& light : problem.lights)
         (std::holds_alternative<OneDirection>(light.directions) ? result.fixed : result.changing).push_back(light);
     const auto directions = by_direction(result.fixed);
@@ -173,8 +188,10 @@ LightTerms light_terms(const Problem& problem, double beyond, const TermChoice& 
     add_basis(result, kernels.basis(choose(kernels, incidence, result), beyond));
     drop_examples();
     if (!problem.coming.survey.empty()) {
-        const auto moments = std::ranges::count_if(result.terms, &LightTerm::is_moment);
-        check_memory(problem, static_cast<std::size_t>(moments) * problem.plane.texels() * sizeof(float));
+        std::size_t kept = 0;
+        for (std::size_t t = 0; t < result.terms.size(); ++t)
+            kept += result.terms[t].is_moment() && result.terms[t].source == t ? 1 : 0;
+        check_memory(problem, kept * problem.plane.texels() * sizeof(float));
     }
     return result;
 }

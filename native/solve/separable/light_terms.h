@@ -26,6 +26,7 @@ struct LightTerm {
     Phase phase = Phase::cosine;
     std::size_t set = 0;
     std::vector<std::vector<KernelTerm>> kernels;  // [result], sorted, see `KernelSpectra::parts`; empty: none
+    std::size_t source = 0;  // of moments: the term whose added light this term's is a factor of
 
     bool is_moment() const { return fixed.empty(); }
 };
@@ -37,7 +38,8 @@ public:
     // No plane.
     MomentPlanes() = default;
 
-    // Planes of zeros for the terms that are moments; the others have none. Calls `advance` after each, from any thread.
+    // Planes of zeros for the terms that are moments, which share those of their sources; the others have none. Calls
+    // `advance` after each, from any thread.
     MomentPlanes(const std::vector<LightTerm>& terms, std::size_t texels, const std::function<void()>& advance);
 
     void clear(const std::function<void()>& advance = {});
@@ -49,7 +51,8 @@ public:
 private:
     std::size_t m_texels = 0;
     HugePages<float> m_data;
-    std::vector<float*> m_planes;  // [term]
+    std::vector<float*> m_planes;    // [term]
+    std::vector<std::size_t> m_own;  // terms that keep a plane
 };
 
 // All terms. Lights of few directions have one term per direction, with all harmonics. All other lights, of any number,
@@ -64,6 +67,18 @@ struct LightTerms {
     std::vector<LightTerm> terms;
     std::vector<ScaledProfile> profiles;
     MomentPlanes moments;  // of added light
+    const float* entering = nullptr;  // as of `Problem`
+    std::size_t channels = 0;         // of these factors
+
+    // Factor of a set's light that enters at a texel.
+    float entering_factor(std::size_t set, std::size_t y, std::size_t x) const
+    {
+        return entering ? entering[(y * plane.width + x) * channels + sets.channel(set)] : 1.0f;
+    }
+
+    // True if sets differ in what enters. Terms are then in the order of the sets, as many for each: terms
+    // set + i * sets.count() are those of a set.
+    bool have_sets_apart() const { return entering && sets.count() > 1; }
 };
 
 // Chooses the terms of a decomposition that lights of changing directions need.
@@ -102,16 +117,20 @@ std::vector<float> factors_of_directions(const LightTerms& terms, std::span<cons
 // The terms' light in one row of texels, from stored and added lights.
 class TermRow {
 public:
-    // Computes the values of terms [first, first + count).
-    void start(const LightTerms& terms, const RowSpan& span, std::size_t first, std::size_t count);
+    // Computes the values of `count` terms from the first, `step` apart.
+    void start(const LightTerms& terms, const RowSpan& span, std::size_t first, std::size_t count,
+               std::size_t step = 1);
 
-    const float* values(std::size_t term) const { return m_values.data() + (term - m_first) * m_width; }
+    // [term][texel], of the terms in their order.
+    const float* values() const { return m_values.data(); }
 
 private:
-    std::size_t m_width = 0;
-    std::size_t m_first = 0;
-    std::vector<float> m_values;  // [term - first][texel]
+    void enter(const LightTerms& terms, const RowSpan& span, std::size_t first, std::size_t count, std::size_t step);
+
+    std::vector<float> m_values;
     std::vector<float> m_light;
+    std::vector<float> m_colors;
+    std::vector<float> m_entering;
     BeamRow m_beams;  // of one light
     BeamMoments m_moments;
 };

@@ -12,11 +12,12 @@ namespace {
 // Beams of a row that pass all steps together. More: more cache.
 constexpr std::size_t beams_at_once = 512;
 
+// Colors of added light, 0 in sets that follow from others.
 std::vector<float> set_colors(const LightTerms& terms, const std::vector<double>& color)
 {
     std::vector<float> colors;
     for (std::size_t set = 0; set < terms.sets.count(); ++set)
-        colors.push_back(static_cast<float>(color[terms.sets.channel(set)]));
+        colors.push_back(terms.sets.source(set) == set ? static_cast<float>(color[terms.sets.channel(set)]) : 0.0f);
     return colors;
 }
 
@@ -86,31 +87,55 @@ std::vector<float> factors_of_directions(const LightTerms& terms, std::span<cons
     return factors;
 }
 
-void TermRow::start(const LightTerms& terms, const RowSpan& span, std::size_t first, std::size_t count)
+void TermRow::start(const LightTerms& terms, const RowSpan& span, std::size_t first, std::size_t count,
+                    std::size_t step)
 {
-    m_width = span.width;
-    m_first = first;
     m_values.assign(count * span.width, 0.0f);
     bool has_moments = false;
-    for (std::size_t t = first; t < first + count; ++t) {
-        float* row = m_values.data() + (t - first) * m_width;
+    for (std::size_t i = 0; i < count; ++i) {
+        const std::size_t t = first + i * step;
+        float* row = m_values.data() + i * span.width;
         has_moments |= terms.terms[t].is_moment();
         for (const auto& [light, weight] : terms.terms[t].fixed) {
             m_light.resize(span.width);
             copy_row(terms.fixed[light].irradiance, span.y, span.x, span.width, m_light.data());
             add_scaled(row, m_light.data(), weight, span.width);
         }
-        if (const float* added = terms.moments.plane(t))
-            std::copy_n(added + span.y * terms.plane.width + span.x, span.width, row);
+        if (const float* added = terms.moments.plane(t)) {
+            const auto factor = static_cast<float>(terms.sets.source_factor(terms.terms[t].set));
+            scale(row, added + span.y * terms.plane.width + span.x, factor, span.width);
+        }
     }
-    if (!has_moments)
-        return;
-    for (std::size_t x = 0; x < span.width; x += beams_at_once) {
+    const std::size_t end = first + (count - 1) * step + 1;
+    for (std::size_t x = 0; x < span.width && has_moments; x += beams_at_once) {
         const RowSpan part{span.y, span.x + x, std::min(beams_at_once, span.width - x)};
-        for (std::size_t l = 0; l < terms.changing.size(); ++l)
-            if (m_beams.read(terms.plane, terms.changing[l], part))
-                m_moments.add(terms, m_beams, terms.colors[l], first, first + count,
-                              [&](std::size_t t) { return m_values.data() + (t - first) * m_width + x; });
+        for (std::size_t l = 0; l < terms.changing.size(); ++l) {
+            if (!m_beams.read(terms.plane, terms.changing[l], part))
+                continue;
+            m_colors = terms.colors[l];
+            for (std::size_t set = 0; set < m_colors.size() && step > 1; ++set)
+                if (set != terms.terms[first].set)
+                    m_colors[set] = 0.0f;
+            m_moments.add(terms, m_beams, m_colors, first, end,
+                          [&](std::size_t t) { return m_values.data() + (t - first) / step * span.width + x; });
+        }
+    }
+    if (terms.entering)
+        enter(terms, span, first, count, step);
+}
+
+// Multiplies light by the factors by which it enters.
+void TermRow::enter(const LightTerms& terms, const RowSpan& span, std::size_t first, std::size_t count,
+                    std::size_t step)
+{
+    const std::size_t sets = terms.sets.count();
+    m_entering.resize(sets * span.width);
+    for (std::size_t set = 0; set < sets; ++set)
+        for (std::size_t x = 0; x < span.width; ++x)
+            m_entering[set * span.width + x] = terms.entering_factor(set, span.y, span.x + x);
+    for (std::size_t i = 0; i < count; ++i) {
+        float* row = m_values.data() + i * span.width;
+        multiply(row, row, m_entering.data() + terms.terms[first + i * step].set * span.width, span.width);
     }
 }
 

@@ -26,12 +26,12 @@ inline constexpr double spread_work = 1.0;
 // The plane is padded so that light that leaves it does not come back.
 class LightField {
 public:
-    // Chooses terms and advances the progress by `choice_work`. The arrays of `problem.lights` must outlive the field;
-    // those of `problem.coming` need not. Throws InvalidArgument, MemoryLimit, Cancelled.
+    // Chooses terms and advances the progress by `choice_work`. The arrays of `problem.lights` and `problem.entering` must
+    // outlive the field; those of `problem.coming` need not. Throws InvalidArgument, MemoryLimit, Cancelled.
     LightField(const Problem& problem, Progress& progress);
 
-    // Adds rays of the coming light of the problem: they are reduced to moments at once and not stored. `color` and
-    // `is_colored` as for `MomentSum`. Several threads may add rays of different rows at once.
+    // Adds rays of the coming light of the problem, before they enter: they are reduced to moments at once and not stored.
+    // `color` and `is_colored` as for `MomentSum`. Several threads may add rays of different rows at once.
     void add(const RayRow& rays, const std::vector<double>& color, bool is_colored);
 
     // False if rays count beside their moments, in light that returns unscattered.
@@ -61,14 +61,25 @@ public:
     std::size_t terms() const { return m_terms.terms.size(); }
 
 private:
+    // Terms that are spread together, and their results.
+    struct TermGroup {
+        std::vector<LightTerm> terms;  // with kernels for these results alone
+        std::size_t first = 0;         // among all terms, `step` apart
+        std::size_t step = 1;
+        std::vector<std::size_t> results;
+    };
+
     // Luminance beyond the reach of the texels' kernels, in the scale of the texels' sums before their factor.
     struct CoarseLuminance {
         CoarseGrid grid;
-        std::vector<std::vector<float>> nodes;  // [result]
+        std::vector<std::vector<float>> nodes;  // [result of the group]
     };
 
+    std::vector<TermGroup> groups() const;
+    MakeLightRow rows_of(const TermGroup& group) const;
     void spread(Progress& progress, float* luminance);
-    CoarseLuminance spread_coarsely(const Level& level, Progress& progress, double work);
+    void spread(const TermGroup& group, Progress& progress, double work, float* luminance);
+    CoarseLuminance spread_coarsely(const TermGroup& group, const Level& level, Progress& progress, double work);
     void add_row(std::size_t result, const RowSpan& span, const float* values, double factor, float* luminance) const;
 
     Problem m_problem;  // without coming light

@@ -107,8 +107,10 @@ float change(const LightTerms& light, const std::vector<std::size_t>& lights, co
     float sum = 0.0f;
     float difference = 0.0f;
     for (const std::size_t l : lights) {
-        const float strength = std::accumulate(light.colors[l].begin(), light.colors[l].end(), 0.0f);
         const auto flow = [&](const Texel& texel) {
+            float strength = 0.0f;
+            for (std::size_t set = 0; set < light.colors[l].size(); ++set)
+                strength += light.colors[l][set] * light.entering_factor(set, texel.y, texel.x);
             const float irradiance = strength * light.changing[l].irradiance(texel.y, texel.x);
             const Vec3 travel = travel_at(light.plane, light.changing[l].directions, texel.y, texel.x);
             sum += irradiance;

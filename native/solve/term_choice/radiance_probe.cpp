@@ -163,7 +163,8 @@ void RadianceProbe::add_beam(const PlaneLight& light, const std::vector<float>& 
                     static_cast<float>(beam.x * toward_probe.y - beam.y * toward_probe.x), irradiance, m_harmonics);
     for (std::size_t set = 0; set < colors.size(); ++set)
         if (colors[set] != 0.0f)
-            add_harmonics(moments.data() + set * m_row_size, by_angle, cosines.data(), colors[set], m_columns.data(),
+            add_harmonics(moments.data() + set * m_row_size, by_angle, cosines.data(),
+                          colors[set] * m_light.entering_factor(set, texel.y, texel.x), m_columns.data(),
                           m_columns.size());
 }
 
