@@ -21,11 +21,12 @@ constexpr int survey_rays = 4;
 
 // The solver takes samples as disks, which overlap where texels are long: a texel's light reaches its neighbors beside in
 // place of its own ends. Long texels are divided into pieces: their length over width from which on, their length over the
-// shortest mean free path below which they stay whole, and their largest number. Larger lengths: fewer samples, and light
-// that is blurred across long texels (docs/tuning.md).
+// shortest mean free path below which they stay whole, and their largest number, also for parts of texels. Larger lengths:
+// fewer samples, and light that is blurred across long texels (docs/tuning.md).
 constexpr double max_stretch = 1.3;
 constexpr double short_in_paths = 0.1;
 constexpr std::size_t max_pieces = 64;
+constexpr std::size_t max_cut_pieces = 8;
 
 // Progress in the units of field_bake.h: a ray to a light with a size, a mean of open and of dim places; tables of the
 // medium, of all samples together; the solution of a sample where light goes as far as samples lie apart, and the power
@@ -71,7 +72,8 @@ struct Samples {
             const double length = glm::length(along);
             const double longest = std::max(max_stretch * glm::length(across), short_in_paths * mean_free_path);
             const double wanted = length > longest ? std::ceil(length / longest) : 1.0;
-            const auto pieces = static_cast<std::size_t>(std::min(wanted, static_cast<double>(max_pieces)));
+            const std::size_t most = coverage < 1.0f ? max_cut_pieces : max_pieces;
+            const auto pieces = static_cast<std::size_t>(std::min(wanted, static_cast<double>(most)));
             for (std::size_t k = 0; k < pieces; ++k) {
                 const double at = (static_cast<double>(k) + 0.5) / static_cast<double>(pieces) - 0.5;
                 all.push_back({Vec3f(texel.position + at * along - origin), texel.normal, texel.tangent,

@@ -93,7 +93,7 @@ class BentGrid:
     def pieces(self) -> float:
         """Mean number of pieces into which the solver divides a texel, about: that of some texels."""
         few = self.coarse(PIECES_SIDE)
-        return pieces_of_texels(few.steps_x, few.steps_y, few.areas)
+        return pieces_of_texels(few.steps_x, few.steps_y, few.areas, few.coverage, self.finer)
 
     @property
     def reach(self) -> float:

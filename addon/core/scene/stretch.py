@@ -6,18 +6,28 @@ import numpy as np
 
 from .polygons import Polygons
 
-MAX_STRETCH, MAX_PIECES = 1.3, 64
-"""Length over width of a texel from which it is divided, and into how many pieces at most, as native/bake has them."""
+MAX_STRETCH, MAX_PIECES, MAX_CUT_PIECES = 1.3, 64, 8
+"""Length over width of a texel from which it is divided, and into how many pieces at most, also where the end of an
+island cuts it; as native/bake has them."""
 
 
-def pieces_of_texels(steps_x: np.ndarray, steps_y: np.ndarray, areas: np.ndarray) -> float:
-    """Mean number of pieces of the texels whose area is not 0, by their steps (..., 3) along columns and rows."""
+def pieces_of_texels(
+    steps_x: np.ndarray, steps_y: np.ndarray, areas: np.ndarray, coverage: np.ndarray, finer: float = 1.0
+) -> float:
+    """Mean number of pieces of the texels whose area is not 0, by their steps (..., 3) along columns and rows.
+
+    `finer`: times as many texels along each side are baked; so many times fewer of them lie at the end of an island.
+    """
     shown = areas > 0
     metric = [
         np.einsum("nc,nc->n", first[shown], second[shown], dtype=float)
         for first, second in ((steps_x, steps_x), (steps_y, steps_y), (steps_x, steps_y))
     ]
-    return float(_pieces(*metric).mean()) if shown.any() else 1.0
+    if not shown.any():
+        return 1.0
+    is_cut = coverage[shown] < 1
+    pieces = np.minimum(_pieces(*metric), np.where(is_cut, MAX_CUT_PIECES, MAX_PIECES))
+    return float(np.average(pieces, weights=np.where(is_cut, 1 / finer, 1.0)))
 
 
 def pieces_of_faces(polygons: Polygons) -> float:
