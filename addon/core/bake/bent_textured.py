@@ -29,6 +29,9 @@ HALO = 1.5
 MAX_ANGLES = 4
 """Largest number of angles from the normal. More: light turns less on surfaces that bend, and more noise."""
 
+ANGLE_STEP = 20.0
+"""Degrees between these angles. Smaller: as more angles."""
+
 SHARP, FINEST = 0.85, 0.6
 """Texel of planes over a mean free path, and least one over that of the surface. Smaller: sharper textures, longer."""
 
@@ -158,7 +161,7 @@ class PointsLight:
             turns[nearest == number] = middle.turns(self._survey.at(nearest == number))
         surveys = [(power, _turned(way, np.tile(turns, len(power) // len(turns)))) for power, way in self._surveys]
         effort = self._effort
-        splitter = Splitter.of(surveys, effort.max_own, effort.is_split, MAX_ANGLES, ONE_AZIMUTH)
+        splitter = Splitter.of(surveys, effort.max_own, effort.is_split, MAX_ANGLES, ONE_AZIMUTH, ANGLE_STEP)
         for number, light in enumerate(self._lights.lights):
             for part, way in rays_of(self._target, light, self._lights, self._settings, self._effort):
                 power, ways = (values.reshape(-1, 3)[image.points] for values in (part, way))

@@ -1,7 +1,7 @@
 """Few directions that stand for all light on a plane.
 
 A light of about one direction keeps it. All others are split between angles from the normal and azimuths, by weights
-that are linear in between.
+that are linear in between: in the cosine of the angle, in which the reflectance bends least, and in the azimuth.
 """
 
 from __future__ import annotations
@@ -10,7 +10,7 @@ from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 NARROW = 2.0
 """Directions within this many degrees count as one. Larger: fewer paths, and light that goes another way."""
@@ -18,10 +18,10 @@ NARROW = 2.0
 RANGE = 0.05
 """Fraction of the light that may lie beyond the outermost directions of paths. Larger: nearer to most of the light."""
 
-STEP = 20.0
+STEP = 14.0
 """Degrees between angles from the normal where there may be more than two. Larger: fewer paths, as above."""
 
-ANGLES = 3
+ANGLES = 4
 """Largest number of angles from the normal, with four azimuths each. More: light goes its own way, and more noise."""
 
 MAX_OWN = 3
@@ -60,17 +60,23 @@ class DirectionClasses:
 
     @classmethod
     def of(
-        cls, powers: Sequence[NDArray], ways: Sequence[NDArray], max_angles: int = ANGLES, one_azimuth: float = NARROW
+        cls,
+        powers: Sequence[NDArray],
+        ways: Sequence[NDArray],
+        max_angles: int = ANGLES,
+        one_azimuth: float = NARROW,
+        step: float = STEP,
     ) -> DirectionClasses:
         """Classes between which nearly all of the light lies, whose power (N,) and directions (N, 3) are given.
 
         Parameters
         ----------
         one_azimuth : azimuths within this many degrees count as one.
+        step : degrees between angles.
         """
         power, way = np.concatenate(powers), np.concatenate(ways)
         angle, azimuth = _angles(way)
-        angles = _nodes(angle, power, max_angles)
+        angles = _nodes(angle, power, max_angles, step)
         if angles[-1] < STEEP:
             return cls(angles, (0.0,), False)
         return cls(angles, *_azimuth_nodes(azimuth, power * np.sin(np.radians(angle)), one_azimuth))
@@ -95,7 +101,7 @@ class DirectionClasses:
         angle, azimuth = _angles(way)
         around = [self._around(azimuth, number) for number in range(len(self.azimuths))]
         for number in range(len(self.angles)):
-            of_angle = _weight(angle, self.angles, number)
+            of_angle = _weight(_steepness(angle), _steepness(self.angles), number)
             for of_azimuth in around:
                 yield (of_angle * of_azimuth).astype(np.float32)
 
@@ -152,10 +158,11 @@ class Splitter:
         is_split: bool = True,
         max_angles: int = ANGLES,
         one_azimuth: float = NARROW,
+        step: float = STEP,
     ) -> Splitter:
         """From powers (...) and directions (..., 3) of each light; not `is_split`: others have their mean one.
 
-        `max_angles`, `one_azimuth`: as for `DirectionClasses.of`.
+        `max_angles`, `one_azimuth`, `step`: as for `DirectionClasses.of`.
         """
         directions = [direction_of(*survey) for survey in surveys]
         narrow = [number for number, way in enumerate(directions) if way is not None]
@@ -167,7 +174,7 @@ class Splitter:
         powers, ways = [power.ravel() for power, _ in rest], [way.reshape(-1, 3) for _, way in rest]
         if not is_split:
             return cls(own, DirectionClasses.mean(powers, ways))
-        return cls(own, DirectionClasses.of(powers, ways, max_angles, one_azimuth))
+        return cls(own, DirectionClasses.of(powers, ways, max_angles, one_azimuth, step))
 
     @property
     def beams(self) -> Beams:
@@ -197,12 +204,17 @@ def _angles(way: NDArray) -> tuple[NDArray, NDArray]:
     return angle.round(DIGITS), np.degrees(np.arctan2(y, x)).round(DIGITS)
 
 
-def _nodes(values: NDArray, weights: NDArray, most: int) -> tuple[float, ...]:
+def _steepness(angle: ArrayLike) -> NDArray:
+    """The quantity in which weights are linear, for angles from the normal in degrees; it ascends."""
+    return -np.cos(np.radians(angle)).round(DIGITS + 2)  # of numbers below 1, where angles have two digits more
+
+
+def _nodes(values: NDArray, weights: NDArray, most: int, step: float) -> tuple[float, ...]:
     """One value, or some from the least to the largest between which nearly all of the weight lies."""
     low, high = _quantiles(values, weights)
     if high - low < NARROW:
         return _rounded([(low + high) / 2])
-    count = min(max(round((high - low) / STEP) + 1, 2), most)
+    count = min(max(round((high - low) / step) + 1, 2), most)
     return _rounded(np.linspace(low, high, count))
 
 
