@@ -30,6 +30,10 @@ MAX_STRETCH = 2.0
 CANDIDATES, MAX_PLANES = 16_384, 512
 """Points among which middles are chosen, and number of middles at most. More: slower; fewer planes: more distortion."""
 
+DIGITS = 3
+"""Digits of distances by which middles are chosen. On tubes and balls many points are as far, but for the last bits of
+their normals, which differ between versions of Blender."""
+
 MISMATCH_POWER = 4.0
 """Power of nearness to the plane's part of the surface by which points count. Larger: other layers count less."""
 
@@ -93,7 +97,11 @@ def middles_of(points: Points, core: float) -> list[Middle]:
     """Middles whose cores cover all points."""
     chosen = points.at(np.linspace(0, len(points) - 1, min(len(points), CANDIDATES)).astype(int))
     nearest, middles = np.full(len(chosen), np.inf), []
-    while len(middles) < MAX_PLANES and (farthest := int(np.argmax(nearest))) >= 0 and nearest[farthest] > 1:
+    while len(middles) < MAX_PLANES:
+        rounded = nearest.round(DIGITS)
+        farthest = int(np.argmax(rounded))
+        if rounded[farthest] <= 1:
+            break
         axes = (np.asarray(values[farthest], float) for values in (chosen.normals, chosen.tangents))
         middles.append(Middle(chosen.positions[farthest], *axes, core))
         nearest = np.minimum(nearest, middles[-1].distances(chosen))
