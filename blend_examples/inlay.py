@@ -1,7 +1,8 @@
 """The scene inlay: a table top of alabaster, inlaid with a dark stone, by a candle. Lengths are meters.
 
 Narrow pieces of the dark stone let the light of the alabaster through, and its edges are soft; points of stars fade. A
-texture that multiplies light cuts them out of paper.
+texture that multiplies light cuts them out of paper. The ior is 1, so that Cycles can trace paths through the stones,
+too (with_volume.py).
 """
 
 import numpy as np
@@ -19,7 +20,7 @@ def build():
     scene.view_settings.look = "Medium High Contrast"
     scene.beamspread.resolution = 512
     stone, node = parts.medium_material(
-        "Inlay", color_mode="BASE_COLOR", mean_free_path=(0.3 * MM,) * 3, anisotropy=0.8, ior=1.5
+        "Inlay", color_mode="BASE_COLOR", mean_free_path=(1.5 * MM,) * 3, anisotropy=0.0, ior=1.0
     )
     parts.paint(stone, node, "Inlay", pattern())
     parts.plane("Table top", SIDE, SIDE, stone)
@@ -29,7 +30,7 @@ def build():
     tray = "0,0 12,0 12,0 13,1.5 13,1.5 12,1.5 11,1 5,1 5,1 5,9 5,9 4.4,9 4.4,9 0,9"
     parts.lathe("Candlestick", parts.rounded(tray), brass, (-22 * MM, 26 * MM, 0), MM)
     parts.point_lamp("Candle", (-22 * MM, 26 * MM, 24 * MM), 0.09, (1.0, 0.76, 0.48))
-    parts.sun("Light of the room", parts.direction(30, 200), 0.12, (0.6, 0.75, 1.0), shadow=False)
+    parts.sun("Light of the room", parts.direction(30, 200), 0.12, (0.6, 0.75, 1.0))
     scene.cycles.max_bounces, scene.cycles.diffuse_bounces, scene.cycles.glossy_bounces = 3, 1, 2
     parts.camera((0.012, -0.125, 0.098), (0.0, -0.006, 0.0), lens=50)
 

@@ -1,7 +1,8 @@
 """The scene veined_slab: a slab of veined onyx behind a small balustrade, in low sun. Lengths are metres.
 
 Light from the stone around a thin vein passes through it and washes it out; wide veins stay dark and darken their
-neighborhood. A texture that multiplies light keeps every vein.
+neighborhood. A texture that multiplies light keeps every vein. The ior is 1, so that Cycles can trace paths through the
+onyx, too (with_volume.py).
 """
 
 import numpy as np
@@ -18,13 +19,13 @@ def build():
     scene.view_settings.look = "Medium High Contrast"
     scene.beamspread.resolution = 720
     onyx, node = parts.medium_material(
-        "Onyx", color_mode="BASE_COLOR", mean_free_path=(0.4 * MM,) * 3, anisotropy=0.8, ior=1.5
+        "Onyx", color_mode="BASE_COLOR", mean_free_path=(2 * MM,) * 3, anisotropy=0.0, ior=1.0
     )
     parts.paint(onyx, node, "Onyx", veins())
     parts.plane("Slab", WIDTH, DEPTH, onyx)
     surroundings()
     parts.sun("Low sun", parts.direction(66, -24), 6.5, (1.0, 0.88, 0.72))
-    parts.sun("Light of the room", parts.direction(20, 120), 0.15, (0.7, 0.8, 1.0), shadow=False)
+    parts.sun("Light of the room", parts.direction(20, 120), 0.15, (0.7, 0.8, 1.0))
     scene.cycles.max_bounces, scene.cycles.diffuse_bounces, scene.cycles.glossy_bounces = 3, 1, 2
     parts.camera((0.05, -0.185, 0.158), (-0.003, -0.003, 0.006), lens=50)
 

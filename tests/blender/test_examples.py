@@ -100,10 +100,20 @@ def test_all_open_ready_to_bake(name):
 
 
 # Texels of the bake that the path tracing covers, and those along the side of its blocks.
-TRACED = {"printed_letters": (np.s_[:], 8), "freckled_arm": (np.s_[16:112, 24:168], 4)}
+TRACED = {
+    "printed_letters": (np.s_[:], 8),
+    "freckled_arm": (np.s_[16:112, 24:168], 4),
+    "veined_slab": (np.s_[:], 12),
+    "inlay": (np.s_[:], 8),
+}
 # Mean error beyond the noise of the paths, with the noise of the bake, and error of the total, whose paths have noise
 # below .1 %. Bent textures have the bounds of tests/statistical/test_bent_textures.py, here for less contrast.
-OFF = {"printed_letters": (0.01, 0.005), "freckled_arm": (0.02, 0.01)}
+OFF = {
+    "printed_letters": (0.01, 0.005),
+    "freckled_arm": (0.02, 0.01),
+    "veined_slab": (0.015, 0.005),
+    "inlay": (0.025, 0.01),
+}
 OF_CONVENTION = 0.7  # most of the convention's error
 
 
