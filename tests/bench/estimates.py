@@ -42,6 +42,8 @@ def main():
         for resolution in options.resolution:
             words = [str(INSIDE), str(scene), str(resolution), str(options.times)]
             done = subprocess.run([sys.executable, *words], env=environment, capture_output=True, text=True)
+            if done.returncode:
+                raise SystemExit(done.stderr)
             for line in done.stdout.splitlines():
                 if not line.startswith('{"scene"'):
                     continue
