@@ -13,7 +13,7 @@ namespace beamspread {
 // A texel outside of the mesh has normal 0, and its other values do not count.
 struct BentTexel {
     Vec3 position{};  // world, metres: the middle of the part of the mesh that the texel shows
-    Vec3f step_x{};   // metres per texel along columns and rows, in the plane of the face
+    Vec3f step_x{};   // metres per texel along columns and rows, in the plane of the face; see `BentTexels`
     Vec3f step_y{};
     Vec3f normal{};     // shading normal, unit vector toward the lit side
     Vec3f tangent{};  // unit vector at right angles to the normal; the frame is tangent, cross(normal, tangent), normal

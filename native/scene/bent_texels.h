@@ -25,8 +25,8 @@ struct BentTexels {
     // The rest is that of one point: the centroid of the covered part, on the triangle that it lies in. Where it lies in
     // none, between two islands, it is the centroid of the part of the triangle that covers most.
     View2D<Vec3> positions;
-    // Change of position along columns and rows, metres, in the plane of the triangle. They span the texel's area where
-    // that is less than a whole texel of the triangle.
+    // Change of position along columns and rows, metres, in the plane of the triangle. Of a texel that shows less than a
+    // whole one they are the sides of a parallelogram with the area and covariance of the covered part.
     View2D<Vec3f> steps_x;
     View2D<Vec3f> steps_y;
     View2D<Vec3f> normals;  // unit; at least `least_cosine` toward the triangle's own normal

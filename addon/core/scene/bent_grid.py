@@ -32,7 +32,8 @@ class BentGrid:
     Attributes
     ----------
     middles : float64, world positions of the middle of the surface that each texel shows.
-    steps_x, steps_y : float32, change of position along columns and rows, scene units per texel.
+    steps_x, steps_y : float32, change of position along columns and rows, scene units per texel; of a texel at the
+        end of an island, the sides of the part that it shows.
     normals : float32, unit shading normals, outward.
     tangents : float32, unit vectors along the columns, at right angles to the normals.
     areas : float32, area of the surface that each texel shows, square scene units.

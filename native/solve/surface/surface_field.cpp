@@ -36,8 +36,7 @@ constexpr std::size_t even_probes = 40;
 // Size over distance of clusters with which the largest luminance is found.
 constexpr float probing_size = 0.3f;
 
-// Area of a cut sample's own light over that of the whole sample, at least. Larger: cut samples are brighter where light
-// spreads about a sample, and darker where it spreads less.
+// Area of a cut sample's own light over that of the whole sample, at least. Larger: the smallest parts are brighter.
 constexpr float least_own = 0.15f;
 
 // Largest difference of the squared length of a unit vector from 1, and of the cosine of two vectors from 0.
