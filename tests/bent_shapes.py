@@ -149,3 +149,23 @@ def flat(grid):
     every = [grid["pitch_x"] * x_axis, grid["pitch_y"] * y_axis, grid["normal"], x_axis]
     vectors = [np.broadcast_to(np.float32(vector), (*size, 3)).copy() for vector in every]
     return Texels(positions, *vectors, np.full(size, grid["pitch_x"] * grid["pitch_y"], np.float32))
+
+
+def hills(side, height=0.1, turns=1.0):
+    """Texels of a square of side 2 with hills in rows and columns; flat without a height."""
+    line = (np.arange(side) + 0.5) / side * 2 - 1
+    x, y = np.meshgrid(line, line)
+    wave, one, none = 6 * turns, np.ones_like(x), np.zeros_like(x)
+    positions = np.stack([x, y, height * (np.sin(wave * x) + np.cos(wave * y))], -1)
+    return from_steps(
+        positions,
+        np.stack([one, none, wave * height * np.cos(wave * x)], -1) * 2 / side,
+        np.stack([none, one, -wave * height * np.sin(wave * y)], -1) * 2 / side,
+    )
+
+
+def from_steps(positions, steps_x, steps_y):
+    """Texels whose normals and areas follow from their steps."""
+    normals = np.cross(steps_x, steps_y)
+    values = steps_x, steps_y, unit(normals), unit(steps_x), np.linalg.norm(normals, axis=-1)
+    return Texels(positions, *[np.ascontiguousarray(value, np.float32) for value in values])

@@ -183,8 +183,8 @@ void bake_surfaces(const std::vector<Surface>& surfaces, const std::vector<Arriv
         if (options.noise)
             add_part(noise, canvas.area / area, *options.noise);
     }
-    if (options.beyond_shares)
-        options.beyond_shares->assign(surfaces.size(), 0.0);
+    if (options.bent_shares)
+        options.bent_shares->assign(surfaces.size(), {});
     for (std::size_t i = 0; i < surfaces.size(); ++i) {
         const Surface& surface = surfaces[i];
         if (!surface.grid.is_bent())
@@ -197,9 +197,9 @@ void bake_surfaces(const std::vector<Surface>& surfaces, const std::vector<Arriv
             if (light)
                 arriving.push_back(&*light);
         progress.advance_by(static_cast<double>(surface.samples()), [&](Progress& part) {
-            const double beyond = bake_bent(surface, arriving, channels, of_surface, part, luminance[i]);
-            if (options.beyond_shares)
-                (*options.beyond_shares)[i] = beyond;
+            const BentShares shares = bake_bent(surface, arriving, channels, of_surface, part, luminance[i]);
+            if (options.bent_shares)
+                (*options.bent_shares)[i] = shares;
         });
         surface.scale_by_color_out(channels.size(), luminance[i]);
         if (options.noise && area > 0.0)

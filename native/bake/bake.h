@@ -14,6 +14,12 @@
 
 namespace beamspread {
 
+// Shares of a mesh that bends; 0 on planes.
+struct BentShares {
+    double beyond = 0.0;  // of its area, which bends more than the LDFs of the media cover
+    double solved = 0.0;  // of its texels; others are interpolated
+};
+
 struct BakeOptions {
     Solver solver = Solver::fft;
     double tolerance = 5e-3;  // largest relative error of a texel by approximating solvers
@@ -27,8 +33,7 @@ struct BakeOptions {
     std::size_t max_stored_bytes = std::size_t{512} << 20;
     std::size_t max_moment_bytes = 0;  // bytes of moments; 0: any
     RayNoise* noise = nullptr;  // takes the noise of all lights by rays; may be null
-    // Takes the share of each surface's area that bends more than the LDFs of the media cover; may be null.
-    std::vector<double>* beyond_shares = nullptr;
+    std::vector<BentShares>* bent_shares = nullptr;  // takes those of each surface; may be null
     bool at_centers = false;  // see RaySettings
 
     // Settings for a light of so many rays from each texel.
@@ -40,8 +45,8 @@ using ArrivingLights = std::vector<std::optional<SurfaceLight>>;
 
 // Writes (height, width, channels) of each surface, exitance / pi in W/(m^2 sr) (Manabe et al. 2012, Eq. 2). Light does
 // not pass from surface to surface. Planes are solved by the solver of the options; meshes that bend by pairs of samples,
-// for `direct` by all of them one by one, with 0 outside of the mesh. `lights`: [surface], all of the same number. The result is the same for any number of
-// threads. Throws InvalidArgument, MemoryLimit, Cancelled.
+// for `direct` by all of them one by one, with 0 outside of the mesh. `lights`: [surface], all of the same number. The
+// result is the same for any number of threads. Throws InvalidArgument, MemoryLimit, Cancelled.
 void bake_luminance(const std::vector<Surface>& surfaces, const std::vector<ArrivingLights>& lights,
                     const std::vector<ChannelMedium>& channels, const BakeOptions& options, Progress& progress,
                     const std::vector<float*>& luminance);

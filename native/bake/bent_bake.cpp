@@ -5,8 +5,12 @@
 #include <limits>
 #include <memory>
 #include <numeric>
+#include <optional>
 
+#include "bake/bent_samples.h"
+#include "bake/bent_solution.h"
 #include "bake/field_bake.h"
+#include "bake/nested_texels.h"
 #include "base/threads.h"
 #include "solve/surface/surface_field.h"
 
@@ -19,15 +23,6 @@ namespace {
 constexpr std::size_t survey_texels = 2048;
 constexpr int survey_rays = 4;
 
-// The solver takes samples as disks, which overlap where texels are long: a texel's light reaches its neighbors beside in
-// place of its own ends. Long texels are divided into pieces: their length over width from which on, their length over the
-// shortest mean free path below which they stay whole, and their largest number, also for parts of texels. Larger lengths:
-// fewer samples, and light that is blurred across long texels (docs/tuning.md).
-constexpr double max_stretch = 1.3;
-constexpr double short_in_paths = 0.1;
-constexpr std::size_t max_pieces = 64;
-constexpr std::size_t max_cut_pieces = 8;
-
 // Progress in the units of field_bake.h: a ray to a light with a size, a mean of open and of dim places; tables of the
 // medium, of all samples together; the solution of a sample where light goes as far as samples lie apart, and the power
 // by which it grows with that distance. Larger: a bar that slows down less there.
@@ -36,65 +31,10 @@ constexpr double tables_work = 1e6;
 constexpr double pairs_work = 40.0;
 constexpr double reach_power = 0.6;
 
-// Coverage that smaller ones count as: rounding decides about their areas.
-constexpr float least_coverage = 1e-5f;
-
-// Replaces the sides of a parallelogram by those of the rectangle of the same covariance, the shorter one first.
-void find_axes(Vec3& across, Vec3& along)
-{
-    const double xx = glm::dot(across, across);
-    const double yy = glm::dot(along, along);
-    const double xy = glm::dot(across, along);
-    const double angle = 0.5 * std::atan2(2.0 * xy, xx - yy);  // of the longer axis
-    const Vec3 longer = across * std::cos(angle) + along * std::sin(angle);
-    across = along * std::cos(angle) - across * std::sin(angle);
-    along = longer;
-}
-
-// The samples of a mesh, in the order of its texels: one for each texel inside, or several for a long one.
-struct Samples {
-    Samples(const Surface& surface, double mean_free_path)
-    {
-        const ReceiverGrid& grid = surface.grid;
-        const Vec3 origin = 0.5 * (grid.shape->low + grid.shape->high);
-        for (std::size_t i = 0; i < grid.texels(); ++i) {
-            first.push_back(all.size());
-            const BentTexel& texel = grid.bent_texel(i);
-            if (!(texel.area > 0.0f))
-                continue;
-            Vec3 across(texel.step_x);
-            Vec3 along(texel.step_y);
-            const float coverage = surface.coverage ? surface.coverage[i] : 1.0f;
-            if (coverage < 1.0f)
-                find_axes(across, along);
-            else
-                reduce_steps(across, along);
-            const double length = glm::length(along);
-            const double longest = std::max(max_stretch * glm::length(across), short_in_paths * mean_free_path);
-            const double wanted = length > longest ? std::ceil(length / longest) : 1.0;
-            const std::size_t most = coverage < 1.0f ? max_cut_pieces : max_pieces;
-            const auto pieces = static_cast<std::size_t>(std::min(wanted, static_cast<double>(most)));
-            for (std::size_t k = 0; k < pieces; ++k) {
-                const double at = (static_cast<double>(k) + 0.5) / static_cast<double>(pieces) - 0.5;
-                all.push_back({Vec3f(texel.position + at * along - origin), texel.normal, texel.tangent,
-                               texel.area / static_cast<float>(pieces)});
-                steps.push_back({Vec3f(across), Vec3f(along / static_cast<double>(pieces))});
-                whole_areas.push_back(all.back().area / std::max(coverage, least_coverage));
-            }
-        }
-        first.push_back(all.size());
-    }
-
-    std::vector<SurfaceSample> all;
-    std::vector<SampleSteps> steps;
-    std::vector<float> whole_areas;  // see `SurfaceProblem`
-    std::vector<std::size_t> first;  // [texel], and the number of all
-};
-
 // Adds rays at texels to a field of samples.
 class SampleSink final : public RaySink {
 public:
-    SampleSink(const Samples& samples, const std::vector<double>& color, SurfaceField& field)
+    SampleSink(const BentSamples& samples, const std::vector<double>& color, SurfaceField& field)
         : m_samples(samples), m_color(color), m_field(field)
     {
     }
@@ -119,7 +59,7 @@ private:
         std::vector<Vec3f> travel, irradiance;
     };
 
-    const Samples& m_samples;
+    const BentSamples& m_samples;
     const std::vector<double>& m_color;
     SurfaceField& m_field;
     PerThread<Scratch> m_scratch;
@@ -182,8 +122,15 @@ double gather_work(const SurfaceLight& light, int rays)
     return light_work + (!light.field && light.has_size() ? bent_ray_work * rays : 0.0);
 }
 
+// True if light leaves on the other side than it enters. It may do so without scattering, far from where it enters.
+bool is_transmitted(const std::vector<ChannelMedium>& channels)
+{
+    return std::ranges::any_of(channels,
+                               [](const ChannelMedium& channel) { return channel.side == Side::transmitted; });
+}
+
 // Work of the solution of all samples, relative to their number.
-double pair_work(const Samples& samples, const std::vector<ChannelMedium>& channels)
+double pair_work(const BentSamples& samples, const std::vector<ChannelMedium>& channels)
 {
     double area = 0.0;
     for (const SurfaceSample& sample : samples.all)
@@ -213,18 +160,18 @@ bool is_colored(const Surface& surface, const std::vector<const SurfaceLight*>& 
 
 }  // namespace
 
-double bake_bent(const Surface& surface, const std::vector<const SurfaceLight*>& lights,
-                 const std::vector<ChannelMedium>& channels, const BakeOptions& options, Progress& progress,
-                 float* luminance)
+BentShares bake_bent(const Surface& surface, const std::vector<const SurfaceLight*>& lights,
+                     const std::vector<ChannelMedium>& channels, const BakeOptions& options, Progress& progress,
+                     float* luminance)
 {
     std::fill_n(luminance, surface.samples() * channels.size(), 0.0f);
     const auto shorter = [](const ChannelMedium& a, const ChannelMedium& b) {
         return a.mean_free_path < b.mean_free_path;
     };
-    const Samples samples(surface, std::ranges::min_element(channels, shorter)->mean_free_path);
+    const BentSamples samples(surface, std::ranges::min_element(channels, shorter)->mean_free_path);
     if (samples.all.empty() || lights.empty()) {
         progress.finish();
-        return 0.0;
+        return {};
     }
     const std::vector<double> means = survey(surface, lights, options);
     const double all = std::accumulate(means.begin(), means.end(), 0.0);
@@ -235,10 +182,15 @@ double bake_bent(const Surface& surface, const std::vector<const SurfaceLight*>&
         works.push_back(gather_work(*lights[i], rays.back()));
     }
     const double tables = tables_work / static_cast<double>(samples.all.size());
-    const double pairs = pair_work(samples, channels);
+    std::optional<NestedTexels> nested;
+    if (options.solver != Solver::direct && !is_transmitted(channels))
+        nested.emplace(surface.grid, samples.whole_texels(surface));
+    BentSolution solution(surface.grid, samples.first, nested ? &*nested : nullptr);
+    const double pairs = pair_work(samples, channels) * solution.least_part();
     progress.set_total(std::accumulate(works.begin(), works.end(), tables + pairs));
     const SurfaceProblem problem{.samples = samples.all,
                                  .steps = samples.steps,
+                                 .neighbors = samples.neighbors,
                                  .whole_areas = samples.whole_areas,
                                  .channels = channels,
                                  .tolerance = options.tolerance,
@@ -253,18 +205,9 @@ double bake_bent(const Surface& surface, const std::vector<const SurfaceLight*>&
             SampleSink sink(samples, lights[i]->color, *field);
             lights[i]->gather(surface, options.ray_settings(rays[i]), sink, part);
         });
-    std::vector<float> values(samples.all.size() * channels.size());
-    progress.advance_by(pairs, [&](Progress& part) { field->solve(part, values.data()); });
-    // The luminance of a texel is the mean of its pieces.
-    const std::size_t count = channels.size();
-    for (std::size_t i = 0; i < surface.samples(); ++i) {
-        const std::size_t pieces = samples.first[i + 1] - samples.first[i];
-        for (std::size_t k = samples.first[i]; k < samples.first[i + 1]; ++k)
-            for (std::size_t c = 0; c < count; ++c)
-                luminance[i * count + c] += values[k * count + c] / static_cast<float>(pieces);
-    }
+    progress.advance_by(pairs, [&](Progress& part) { solution.solve(*field, options.tolerance, part, luminance); });
     progress.finish();
-    return field->beyond_share();
+    return solution.shares();
 }
 
 }  // namespace beamspread

@@ -8,10 +8,9 @@
 namespace beamspread {
 
 // Writes (height, width, channels) without the color of light that leaves; 0 outside of the mesh. `lights`: those that
-// arrive. Returns the share of the area that bends more than the LDFs of the media cover. Throws InvalidArgument,
-// MemoryLimit, Cancelled.
-double bake_bent(const Surface& surface, const std::vector<const SurfaceLight*>& lights,
-                 const std::vector<ChannelMedium>& channels, const BakeOptions& options, Progress& progress,
-                 float* luminance);
+// arrive. Throws InvalidArgument, MemoryLimit, Cancelled.
+BentShares bake_bent(const Surface& surface, const std::vector<const SurfaceLight*>& lights,
+                     const std::vector<ChannelMedium>& channels, const BakeOptions& options, Progress& progress,
+                     float* luminance);
 
 }  // namespace beamspread

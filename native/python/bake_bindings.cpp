@@ -173,14 +173,15 @@ std::vector<Array<float>> luminance(const std::vector<const HeldSurface*>& held,
                                     double tolerance, int samples, int rays, int min_rays, std::uint32_t seed,
                                     int threads, std::size_t max_stored_bytes, std::size_t memory_limit,
                                     const py::object& progress, const py::object& report_noise,
-                                    const py::object& report_beyond, const std::string& side)
+                                    const py::object& report_beyond, const std::string& side,
+                                    const py::object& report_solved)
 {
     const std::vector<ChannelMedium> media = media_of(ldf, albedo, mean_free_path, side);
     const std::vector<ArrivingLights> lights = arriving_lights(light_tuples, held.size());
     RayNoise noise;
-    std::vector<double> beyond_shares;
-    const BakeOptions options{named_solver(solver), tolerance,    samples, rays,          min_rays, seed, threads,
-                              max_stored_bytes,     memory_limit, &noise,  &beyond_shares};
+    std::vector<BentShares> shares;
+    const BakeOptions options{named_solver(solver), tolerance,    samples, rays,   min_rays, seed, threads,
+                              max_stored_bytes,     memory_limit, &noise,  &shares};
     Progress report(progress_callback(progress));
     std::vector<Array<float>> results;
     std::vector<Surface> surfaces;
@@ -196,8 +197,15 @@ std::vector<Array<float>> luminance(const std::vector<const HeldSurface*>& held,
     }
     if (!report_noise.is_none())
         report_noise(noise.irradiance, noise.variance);
-    if (!report_beyond.is_none())
-        report_beyond(beyond_shares);
+    const auto report_shares = [&](const py::object& take, double BentShares::* share) {
+        std::vector<double> values;
+        for (const BentShares& of_surface : shares)
+            values.push_back(of_surface.*share);
+        if (!take.is_none())
+            take(values);
+    };
+    report_shares(report_beyond, &BentShares::beyond);
+    report_shares(report_solved, &BentShares::solved);
     return results;
 }
 
@@ -314,7 +322,7 @@ ValueError
           py::arg("rays") = 256, py::arg("min_rays") = BakeOptions().min_rays, py::arg("seed") = 0,
           py::arg("threads") = 0, py::arg("max_stored_bytes") = BakeOptions().max_stored_bytes,
           py::arg("memory_limit") = 0, py::arg("progress") = py::none(), py::arg("report_noise") = py::none(),
-          py::arg("report_beyond") = py::none(), py::arg("side") = "reflected",
+          py::arg("report_beyond") = py::none(), py::arg("side") = "reflected", py::arg("report_solved") = py::none(),
           R"(Luminance of translucent surfaces: the engine behind `beamspread.core.bake`.
 
 Parameters
@@ -351,6 +359,9 @@ report_beyond : callable, optional
     report_beyond(shares) takes the share of each surface's area that bends more than the LDFs cover; 0 on planes.
 side : {"reflected", "transmitted"}
     Side of the luminance: where light enters, or the far side of a slab, at the same texels.
+report_solved : callable, optional
+    report_solved(shares) takes the share of each bent mesh's texels that are solved; others are interpolated, within
+    the tolerance. 0 on planes.
 
 Returns
 -------

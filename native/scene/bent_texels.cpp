@@ -20,6 +20,9 @@ constexpr std::size_t rows_per_band = 32;
 // Barycentric coordinate down to which a point counts as inside: rounding of centroids on an edge.
 constexpr double inside_tolerance = 1e-9;
 
+// Parts of texels that smaller ones count as none: rounding leaves them where edges run between texels.
+constexpr double least_part = 1e-6;
+
 // Part of a texel's area from which on it counts as whole.
 constexpr double whole_fraction = 1.0 - 1e-6;
 
@@ -283,8 +286,9 @@ public:
 private:
     Texel& at(std::size_t x, std::size_t y) { return m_texels[(y - m_first) * m_width + x]; }
 
-    void write_texel(const Texel& texel, std::size_t x, std::size_t y, const BentTexels& result) const
+    void write_texel(const Texel& found, std::size_t x, std::size_t y, const BentTexels& result) const
     {
+        const Texel texel = found.covered.area < least_part ? Texel{} : found;
         result.covered(y, x) = static_cast<float>(texel.covered.area);
         result.areas(y, x) = static_cast<float>(texel.area);
         result.triangles(y, x) = texel.triangle;
@@ -309,7 +313,7 @@ private:
         const Vec3 step_y = (across * a.x - along * b.x) / twice_area;
         const double whole = glm::length(glm::cross(step_x, step_y));
         std::array<Vec3, 2> steps = {step_x, step_y};
-        if (texel.area < whole_fraction * whole) {
+        if (texel.area < whole_fraction * whole && part.area >= least_part) {
             const std::array<Vec2, 2> shape = shape_of(part, Vec2(x, y));
             for (std::size_t i = 0; i < 2; ++i)
                 steps[i] = step_x * shape[i].x + step_y * shape[i].y;

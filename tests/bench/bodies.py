@@ -6,14 +6,22 @@ A lamp above a ball, a wavy field and a plane; ior 1.4, albedo .95, .9 and .6, i
 .005 as bakes have it. Seconds are CPU seconds of all threads, but for *wall*.
 """
 
+import itertools
 import math
 import sys
 import time
+from pathlib import Path
 
 import _native_test
 import numpy as np
 from beamspread import Medium, convolve, library
 from beamspread.core.bake.spread_light import TOLERANCE
+from beamspread.core.native import native
+
+sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
+
+from bent_shapes import ball as round_mesh
+from bent_shapes import hills, texels_of
 
 ALBEDO = (0.95, 0.9, 0.6)
 PATHS = np.array((1.0, 0.8, 0.6))
@@ -118,6 +126,44 @@ def growth(ldf, counts):
                 )
 
 
+def baked(ldf, counts):
+    print(
+        "\nbakes of textures, where smooth light is interpolated: CPU and wall seconds with tables of the medium, "
+        "share of texels that are solved"
+    )
+    lamp = native.PointLight((0.5, 0.3, 2.0), 0.0, "sphere")
+    card = (
+        np.array([(-0.2, 0.0, 1.3), (0.4, 0.0, 1.3), (0.4, 0.5, 1.3), (-0.2, 0.5, 1.3)]),
+        np.uint32([(0, 1, 2), (0, 2, 3)]),
+    )
+    lights = {
+        "lamp": [(lamp, WHITE, None)],
+        "behind a card": [(lamp, WHITE, native.Occluders([native.OccluderMesh(*card)]))],
+    }
+    for count in counts:
+        side = round(math.sqrt(count))
+        ball_side = round(math.sqrt(count / 2))
+        bodies = {"hills": hills(side), "ball": texels_of(round_mesh(96, 48), 2 * ball_side, ball_side)}
+        for (name, texels), path in itertools.product(bodies.items(), (1.0, 4.0, 16.0)):
+            paths = list(path * PATHS * math.sqrt(texels.areas[texels.areas > 0].mean()))
+            for light, rays in lights.items():
+                shares = []
+                _, wall, cpu = timed(
+                    native.bake_luminance,
+                    [native.Surface(texels.native())],
+                    [rays],
+                    [ldf] * 3,
+                    list(ALBEDO),
+                    paths,
+                    report_solved=shares.extend,
+                )
+                print(
+                    f"  {name:5s} path {path:4g} texels, {texels.inside.sum():8d} texels, {light}: "
+                    f"{cpu:.2f}, {wall:.2f} s, {shares[0]:.0%}",
+                    flush=True,
+                )
+
+
 def beside_fft(ldf, count):
     print(f"\na plane of {count} samples, CPU seconds over those of fft; worst texel against it")
     light = under_lamp(plane, count, lambda normal: np.tile((1.0, 0.0, 0.0), (len(normal), 1)))
@@ -179,6 +225,7 @@ def main(largest=1_000_000):
     curved = library(MEDIUM, "preview", curved=largest >= 10_000)  # planes alone for a quick try
     print(f"LDFs of {len(curved.curvatures)} curvatures")
     growth(curved, [count for count in (10_000, 100_000, 1_000_000) if count < largest] + [largest])
+    baked(curved, [100_000, 1_000_000] if largest >= 1_000_000 else [largest])
     beside_fft(curved, min(largest, 1_000_000))
     large(library(Medium(0.0, 1.5), curved=largest >= 10_000), min(largest, 512**2))
     errors(curved, min(largest, 20_000))

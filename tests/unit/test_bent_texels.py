@@ -128,6 +128,21 @@ def test_steps_of_a_texel_at_the_rim_span_its_area():
     assert not z.any()
 
 
+def test_edges_that_run_between_texels_leave_no_slivers():
+    """A grid of UVs on texels' borders but for rounding: 48 columns on 192 texels."""
+    positions, uvs, normals = ball(24, 48)
+    result = texels_of(positions, uvs * (192, 96), normals, 192, 96)
+    assert result["covered"][result["covered"] > 0].min() > 0.49  # triangles at the poles
+    for name in ("steps_x", "steps_y", "normals", "tangents"):
+        assert np.isfinite(result[name]).all()
+    for shift in (1e-13, 1e-9, 1e-7, 1e-5):
+        moved = texels_of(positions, uvs * (192, 96) + shift, normals, 192, 96)
+        shown = moved["covered"] > 0
+        faces = np.cross(moved["steps_x"], moved["steps_y"])[shown]
+        assert np.linalg.norm(faces.astype(float), axis=-1).min() > 0
+        np.testing.assert_allclose(moved["areas"].sum(), result["areas"].sum(), rtol=1e-4)
+
+
 def test_steps_of_a_cut_texel_have_the_shape_of_its_part():
     """Rows of points, 256 x 256 in each texel, tell area and covariance: rounding of a row is .4 % of a side."""
     triangle = np.array([(0.3, 0.2), (4.6, 1.7), (1.4, 3.8)])

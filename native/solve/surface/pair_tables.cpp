@@ -121,7 +121,8 @@ std::size_t PairTables::disk(float area) const
     return std::min(static_cast<std::size_t>(std::max(nearest, 0L)), disks.size() - 1);
 }
 
-void PairTables::add_self_light(float area, const LatticeShape& lattice, const float* moments, float* sums) const
+void PairTables::add_self_light(float area, float neighbors, const LatticeShape& lattice, const float* moments,
+                                float* sums) const
 {
     const float radius = std::sqrt(area * static_cast<float>(inv_pi));
     const std::uint32_t step = std::clamp(chord_step(radius), m_self.first, m_self.first + m_self.rows - 2);
@@ -134,7 +135,7 @@ void PairTables::add_self_light(float area, const LatticeShape& lattice, const f
     const float nearest = std::nearbyint(place);
     const DiskTable& disk = *disks[static_cast<std::size_t>(nearest)];
     const float smaller = std::min(radius / disks.front()->radius, 1.0f);
-    const Neighborhoods near(lattice, (nearest - place) * static_cast<float>(m_disk_step));
+    const Neighborhoods near(lattice, (neighbors - place) * static_cast<float>(m_disk_step));
     std::array<Vec2f, surface_harmonics> turned{Vec2f(1.0f, 0.0f)};
     for (std::size_t m = 1; m < surface_harmonics; ++m) {
         const Vec2f& last = turned[m - 1];

@@ -46,8 +46,9 @@ public:
     std::size_t disk(float area) const;
 
     // Adds the radiant exitance of a sample's middle by its own light, [result]. On even lattices of samples, the sum of
-    // all light is then that of a plane.
-    void add_self_light(float area, const LatticeShape& lattice, const float* moments, float* sums) const;
+    // all light is then that of a plane. `neighbors`: mean index of the disks beside it.
+    void add_self_light(float area, float neighbors, const LatticeShape& lattice, const float* moments,
+                        float* sums) const;
 
     // Bounds on the second derivatives of the first function, [row of the point], 1 / m^4. They don't grow with the chord.
     std::vector<double> second_derivatives(std::size_t result) const;

@@ -19,8 +19,8 @@ namespace {
 // Rays that pass all steps together. More: more cache.
 constexpr std::size_t rays_at_once = 512;
 
-// Leaves of the tree in one work item, which look for their sources together.
-constexpr std::size_t leaves_at_once = 8;
+// Groups of samples in one work item, which look for their sources together.
+constexpr std::size_t groups_at_once = 8;
 
 // Bounds on the error of a far cluster's light over the tolerance that are tried, from the largest on, each half of the
 // one before. The first one is taken whose probed samples differ from those with a quarter of it by less than a fraction
@@ -29,7 +29,7 @@ constexpr double most_share = 64.0;
 constexpr std::size_t shares = 20;
 constexpr double probed_fraction = 0.2;
 
-// Leaves of which samples are probed: the brightest and others. More: errors closer to the tolerance, more time.
+// Groups of which samples are probed: the brightest and others. More: errors closer to the tolerance, more time.
 constexpr std::size_t bright_probes = 8;
 constexpr std::size_t even_probes = 40;
 
@@ -119,6 +119,21 @@ std::shared_ptr<SurfaceKernels> checked_kernels(const SurfaceProblem& problem)
                                           problem.is_colored, problem.tolerance});
     });
     return kernels;
+}
+
+// The brightest groups, and some evenly spread.
+std::vector<SurfaceTree::Group> probed(std::vector<SurfaceTree::Group> groups)
+{
+    if (groups.size() <= bright_probes + even_probes)
+        return groups;
+    std::vector<SurfaceTree::Group> even;
+    for (std::size_t i = 0; i < even_probes; ++i)
+        even.push_back(groups[(2 * i + 1) * groups.size() / (2 * even_probes)]);
+    std::stable_sort(groups.begin(), groups.end(),
+                     [](const SurfaceTree::Group& a, const SurfaceTree::Group& b) { return a.weight > b.weight; });
+    groups.resize(bright_probes);
+    groups.insert(groups.end(), even.begin(), even.end());
+    return groups;
 }
 
 PairTables tables_of(const SurfaceProblem& problem, SurfaceKernels& kernels)
@@ -220,75 +235,87 @@ void SurfaceField::clear()
 void SurfaceField::solve(Progress& progress, float* luminance)
 {
     std::fill_n(luminance, m_problem.samples.size() * m_problem.channels.size(), 0.0f);
-    m_beyond_share = 0.0;
-    m_mean_sources = 0.0;
+    gather();
+    solve({}, progress, luminance);
+}
+
+void SurfaceField::gather()
+{
+    m_is_beyond.assign(m_problem.samples.size(), 0);
+    m_pairs = 0;
+    m_brightest.fill(0.0f);
     if (m_basis.lanes.moments() == 0)
         return;
-    const std::size_t items = (m_tree.leaves() + leaves_at_once - 1) / leaves_at_once;
-    std::vector<Areas> areas(items);
-    std::vector<std::size_t> pairs(items);
     with_threads(m_problem.threads, [&] {
         m_tree.gather(m_basis, m_tables, m_moments);
-        const SurfaceTree::Opening opening = m_problem.is_direct ? SurfaceTree::Opening{} : find_opening();
+        find_opening();
+    });
+}
+
+void SurfaceField::solve(std::span<const std::uint8_t> is_wanted, Progress& progress, float* luminance)
+{
+    if (m_basis.lanes.moments() == 0)
+        return;
+    const SurfaceTree::Targets targets = m_tree.targets(is_wanted);
+    const std::size_t items = (targets.groups.size() + groups_at_once - 1) / groups_at_once;
+    std::vector<std::size_t> pairs(items);
+    with_threads(m_problem.threads, [&] {
         parallel_for(items, [&](std::size_t item) {
             SurfaceTree::Sources& sources = m_sources.local();
-            const std::size_t begin = item * leaves_at_once;
-            const std::size_t end = std::min(m_tree.leaves(), begin + leaves_at_once);
-            m_tree.find_candidates(begin, end, opening, m_tables.reach, sources);
-            for (std::size_t leaf = begin; leaf < end; ++leaf)
-                pairs[item] += solve_leaf(leaf, opening, sources, [&](std::size_t sample, const Exitance& exitance) {
-                    store(sample, exitance, areas[item], luminance);
-                });
+            const std::size_t begin = item * groups_at_once;
+            const std::size_t end = std::min(targets.groups.size(), begin + groups_at_once);
+            const auto groups = std::span(targets.groups).subspan(begin, end - begin);
+            m_tree.find_candidates(groups, m_opening, m_tables.reach, sources);
+            for (const SurfaceTree::Group& group : groups)
+                pairs[item] += solve_group(
+                    group, m_opening, sources,
+                    [&](std::size_t sample, const Exitance& exitance) { store(sample, exitance, luminance); });
             progress.advance(1.0 / static_cast<double>(items));
         });
     });
-    double all = 0.0;
-    for (const auto& [beyond, area] : areas) {
-        m_beyond_share += beyond;
-        all += area;
-    }
-    m_beyond_share /= all;
-    m_mean_sources = static_cast<double>(std::accumulate(pairs.begin(), pairs.end(), std::size_t{0})) /
-                     static_cast<double>(m_problem.samples.size());
+    m_pairs += std::accumulate(pairs.begin(), pairs.end(), std::size_t{0});
 }
 
 // The error of a cluster's light is at most about its weight times its squared size times the kernel's second derivative.
 // How errors of clusters add up depends on the surface and its light: some samples are solved with ever smaller bounds
 // until the results change no more.
-SurfaceTree::Opening SurfaceField::find_opening()
+void SurfaceField::find_opening()
 {
-    const std::vector<std::size_t> leaves = m_tree.probed_leaves(bright_probes, even_probes);
+    const SurfaceTree::Targets targets = m_tree.targets({});
+    const std::vector<SurfaceTree::Group> groups = probed(targets.groups);
     using Exitances = std::vector<std::array<float, max_results>>;
     const auto probe = [&](const SurfaceTree::Opening& opening) {
-        std::vector<Exitances> found(leaves.size());
-        parallel_for(leaves.size(), [&](std::size_t i) {
+        std::vector<Exitances> found(groups.size());
+        parallel_for(groups.size(), [&](std::size_t i) {
             SurfaceTree::Sources& sources = m_sources.local();
-            m_tree.find_candidates(leaves[i], leaves[i] + 1, opening, m_tables.reach, sources);
-            solve_leaf(leaves[i], opening, sources,
-                       [&](std::size_t, const Exitance& exitance) { found[i].push_back(exitance.sums); });
+            m_tree.find_candidates(std::span(&groups[i], 1), opening, m_tables.reach, sources);
+            solve_group(groups[i], opening, sources,
+                        [&](std::size_t, const Exitance& exitance) { found[i].push_back(exitance.sums); });
         });
         return found;
     };
     // Largest difference of results, or largest result.
     const auto largest = [&](std::size_t r, const std::vector<Exitances>& found, const std::vector<Exitances>* other) {
         float most = 0.0f;
-        for (std::size_t i = 0; i < leaves.size(); ++i)
+        for (std::size_t i = 0; i < groups.size(); ++i)
             for (std::size_t k = 0; k < found[i].size(); ++k)
                 most = std::max(most, std::abs(found[i][k][r] - (other != nullptr ? (*other)[i][k][r] : 0.0f)));
-        return static_cast<double>(most);
+        return most;
     };
+    m_opening = {};
     const std::vector<Exitances> first = probe({probing_size, 0, {}});
     std::vector<double> bound(m_tables.point->light.rows);
-    std::array<double, max_results> brightest{};
     for (std::size_t r = 0; r < m_tables.lanes.results; ++r) {
-        brightest[r] = largest(r, first, nullptr);
-        const double scale = static_cast<double>(m_tree.set_scales()[m_basis.terms.sets.results[r].set]);
-        if (brightest[r] == 0.0 || scale == 0.0)
+        m_brightest[r] = largest(r, first, nullptr);
+        const auto scale = static_cast<double>(m_tree.set_scales()[m_basis.terms.sets.results[r].set]);
+        if (m_brightest[r] == 0.0f || scale == 0.0)
             continue;
         const std::vector<double> bends = m_tables.second_derivatives(r);
         for (std::size_t row = 0; row < bound.size(); ++row)
-            bound[row] = std::max(bound[row], bends[row] / (scale * brightest[r]));
+            bound[row] = std::max(bound[row], bends[row] / (scale * static_cast<double>(m_brightest[r])));
     }
+    if (m_problem.is_direct)
+        return;
     std::array<SurfaceTree::Opening, 3> openings;  // the last ones, in turn, and their results
     std::array<std::vector<Exitances>, 3> found;
     for (std::size_t i = 0; i < shares; ++i) {
@@ -300,23 +327,25 @@ SurfaceTree::Opening SurfaceField::find_opening()
         found[i % 3] = probe(opening);
         bool is_enough = i >= 2;
         for (std::size_t r = 0; r < m_tables.lanes.results && i >= 2; ++r) {
-            const double change = largest(r, found[(i - 2) % 3], &found[i % 3]);
-            is_enough = is_enough && change <= probed_fraction * m_problem.tolerance * brightest[r];
+            const auto change = static_cast<double>(largest(r, found[(i - 2) % 3], &found[i % 3]));
+            is_enough =
+                is_enough && change <= probed_fraction * m_problem.tolerance * static_cast<double>(m_brightest[r]);
         }
-        if (is_enough)
-            return openings[(i - 2) % 3];
+        if (is_enough) {
+            m_opening = openings[(i - 2) % 3];
+            return;
+        }
     }
-    return {};
 }
 
 // Returns the number of pairs. `sources` has the candidates.
-std::size_t SurfaceField::solve_leaf(std::size_t leaf, const SurfaceTree::Opening& opening,
-                                     SurfaceTree::Sources& sources,
-                                     const std::function<void(std::size_t, const Exitance&)>& store_exitance) const
+std::size_t SurfaceField::solve_group(const SurfaceTree::Group& group, const SurfaceTree::Opening& opening,
+                                      SurfaceTree::Sources& sources,
+                                      const std::function<void(std::size_t, const Exitance&)>& store_exitance) const
 {
-    m_tree.find(leaf, opening, m_tables.reach, sources);
+    m_tree.find(group, opening, m_tables.reach, sources);
     PairTargets targets;
-    for (const std::uint32_t i : m_tree.samples_of(leaf))
+    for (const std::uint32_t i : group.samples)
         targets.add(m_problem.samples[i].position, m_problem.samples[i].normal, i);
     std::array<float, PairTargets::most * max_results> sums{};
     std::array<float, PairTargets::most> beyond{};
@@ -339,6 +368,18 @@ float SurfaceField::own_area(std::size_t sample) const
     return m_problem.whole_areas.empty() ? area : std::max(area, least_own * m_problem.whole_areas[sample]);
 }
 
+// Mean index of the disks of a sample's neighbors: where areas change, some neighbors have the next larger disk.
+float SurfaceField::neighbor_disk(std::size_t sample) const
+{
+    const auto disk_of = [&](std::size_t i) { return static_cast<float>(m_tables.disk(own_area(i))); };
+    if (m_problem.neighbors.empty())
+        return disk_of(sample);
+    float sum = 0.0f;
+    for (const std::uint32_t neighbor : m_problem.neighbors[sample])
+        sum += disk_of(neighbor);
+    return 0.25f * sum;
+}
+
 LatticeShape SurfaceField::lattice(std::size_t sample) const
 {
     if (m_problem.steps.empty())
@@ -353,23 +394,68 @@ LatticeShape SurfaceField::lattice(std::size_t sample) const
 
 void SurfaceField::add_self(std::size_t sample, std::array<float, 3>& sums) const
 {
-    m_tables.add_self_light(own_area(sample), lattice(sample), m_moments.data() + sample * m_basis.lanes.moments(),
-                            sums.data());
+    m_tables.add_self_light(own_area(sample), neighbor_disk(sample), lattice(sample),
+                            m_moments.data() + sample * m_basis.lanes.moments(), sums.data());
 }
 
-void SurfaceField::store(std::size_t sample, const Exitance& exitance, Areas& areas, float* luminance) const
+void SurfaceField::store(std::size_t sample, const Exitance& exitance, float* luminance)
 {
     const std::size_t channels = m_problem.channels.size();
     for (std::size_t r = 0; r < m_tables.lanes.results; ++r)
-        for (const ChannelSets::Member& member : m_basis.terms.sets.results[r].members) {
-            const double color = m_problem.is_colored ? 1.0 : m_color.empty() ? 0.0 : m_color[member.channel];
-            luminance[sample * channels + member.channel] = std::max(
-                0.0f, static_cast<float>(inv_pi * member.factor * color * static_cast<double>(exitance.sums[r])));
-        }
-    const auto area = static_cast<double>(m_problem.samples[sample].area);
-    areas[1] += area;
-    if (exitance.beyond > beyond_fraction * exitance.sums[0])
-        areas[0] += area;
+        for (const ChannelSets::Member& member : m_basis.terms.sets.results[r].members)
+            luminance[sample * channels + member.channel] =
+                std::max(0.0f, static_cast<float>(luminance_of(member, exitance.sums[r])));
+    m_is_beyond[sample] = exitance.beyond > beyond_fraction * exitance.sums[0] ? 1 : 0;
+}
+
+double SurfaceField::luminance_of(const ChannelSets::Member& member, float exitance) const
+{
+    const double color = m_problem.is_colored ? 1.0 : m_color.empty() ? 0.0 : m_color[member.channel];
+    return inv_pi * member.factor * color * static_cast<double>(exitance);
+}
+
+std::vector<float> SurfaceField::brightest() const
+{
+    std::vector<float> luminance(m_problem.channels.size());
+    for (std::size_t r = 0; r < m_tables.lanes.results; ++r)
+        for (const ChannelSets::Member& member : m_basis.terms.sets.results[r].members)
+            luminance[member.channel] = static_cast<float>(luminance_of(member, m_brightest[r]));
+    return luminance;
+}
+
+std::vector<float> SurfaceField::factors_within(double radius, std::size_t result) const
+{
+    std::vector<float> factors(m_basis.functions());
+    const std::vector<ScaledProfile>& profiles = profiles_of(m_basis, result, flat_index(m_basis, result));
+    for (std::size_t f = 0; f < factors.size(); ++f) {
+        const ScaledProfile& scaled = profiles[m_basis.rank[f]];
+        // Other harmonics cancel around a sample.
+        if (m_basis.harmonic[f] == 0 && m_brightest[result] > 0.0f)
+            factors[f] = static_cast<float>(2.0 * pi * scaled.profile.cumulative(radius / scaled.mean_free_path)[0]) /
+                         m_brightest[result];
+    }
+    return factors;
+}
+
+float SurfaceField::exitance_within(std::span<const float> factors, std::size_t sample, std::size_t result) const
+{
+    const float* moments = m_moments.data() + sample * m_basis.lanes.moments();
+    float sum = 0.0f;
+    for (std::size_t f = 0; f < factors.size(); ++f)
+        sum += factors[f] * moments[m_basis.lanes.place(result, f)];
+    return sum;
+}
+
+double SurfaceField::beyond_share() const
+{
+    double beyond = 0.0;
+    double all = 0.0;
+    for (std::size_t i = 0; i < m_is_beyond.size(); ++i) {
+        const auto area = static_cast<double>(m_problem.samples[i].area);
+        all += area;
+        beyond += m_is_beyond[i] != 0 ? area : 0.0;
+    }
+    return beyond / all;
 }
 
 }  // namespace beamspread

@@ -4,6 +4,7 @@
 
 #include <array>
 #include <cstddef>
+#include <cstdint>
 #include <functional>
 #include <memory>
 #include <mutex>
@@ -27,9 +28,13 @@ struct SampleSteps {
     Vec3f x, y;
 };
 
+// Indices of the samples beside a sample, or its own one where there is none.
+using SampleNeighbors = std::array<std::uint32_t, 4>;
+
 struct SurfaceProblem {
     std::span<const SurfaceSample> samples;
     std::span<const SampleSteps> steps{};  // [sample]; empty: unknown
+    std::span<const SampleNeighbors> neighbors{};  // [sample]; empty: all are as large as the sample
     std::span<const float> whole_areas{};  // [sample] m^2, without the edge that cuts it; empty: none is cut
     std::vector<ChannelMedium> channels;  // at most 3
     double tolerance = 1e-3;              // largest error of a luminance against all pairs, relative to the largest
@@ -57,11 +62,30 @@ public:
     // Writes [sample][channel], radiance in W/(m^2 sr): the sum over all rays. Throws Cancelled.
     void solve(Progress& progress, float* luminance);
 
-    // Share of the area whose light comes from pairs that bend more than the media's LDFs cover; after `solve`.
-    double beyond_share() const { return m_beyond_share; }
+    // The same in parts: `gather` after the last ray, then `solve` for some samples at a time, those where `is_wanted`
+    // [sample] is not 0. Others keep their luminance. Throws Cancelled.
+    void gather();
+    void solve(std::span<const std::uint8_t> is_wanted, Progress& progress, float* luminance);
 
-    // Mean number of sources, samples and clusters, of a sample's light; after `solve`.
-    double mean_sources() const { return m_mean_sources; }
+    // The following are known after `gather`. Results are channels, or media that channels share.
+    std::size_t results() const { return m_tables.lanes.results; }
+
+    // Radiant exitance over the largest one, if the same light as at a sample enters around it up to a radius (metres) and
+    // nowhere else: [function] factors of a result for `exitance_within`.
+    std::vector<float> factors_within(double radius, std::size_t result) const;
+    float exitance_within(std::span<const float> factors, std::size_t sample, std::size_t result) const;
+
+    // Largest luminance of each channel, about.
+    std::vector<float> brightest() const;
+
+    // Whether the light of a solved sample comes from pairs that bend more than the media's LDFs cover.
+    bool is_beyond(std::size_t sample) const { return m_is_beyond[sample] != 0; }
+
+    // Share of the area whose light comes from such pairs; after all samples are solved.
+    double beyond_share() const;
+
+    // Mean number of sources, samples and clusters, of all samples' light.
+    double mean_sources() const { return static_cast<double>(m_pairs) / static_cast<double>(m_problem.samples.size()); }
 
     // Bytes of a sample's moments.
     std::size_t moment_bytes() const { return m_basis.lanes.moments() * sizeof(float); }
@@ -81,16 +105,17 @@ private:
         std::array<float, 3> sums{};
         float beyond = 0.0f;
     };
-    // Areas: by pairs that bend more than the tables, all.
-    using Areas = std::array<double, 2>;
 
-    SurfaceTree::Opening find_opening();
-    std::size_t solve_leaf(std::size_t leaf, const SurfaceTree::Opening& opening, SurfaceTree::Sources& sources,
-                           const std::function<void(std::size_t, const Exitance&)>& store_exitance) const;
+    void find_opening();
+    std::size_t solve_group(const SurfaceTree::Group& group, const SurfaceTree::Opening& opening,
+                            SurfaceTree::Sources& sources,
+                            const std::function<void(std::size_t, const Exitance&)>& store_exitance) const;
     float own_area(std::size_t sample) const;
+    float neighbor_disk(std::size_t sample) const;
     LatticeShape lattice(std::size_t sample) const;
     void add_self(std::size_t sample, std::array<float, 3>& sums) const;
-    void store(std::size_t sample, const Exitance& exitance, Areas& areas, float* luminance) const;
+    void store(std::size_t sample, const Exitance& exitance, float* luminance);
+    double luminance_of(const ChannelSets::Member& member, float exitance) const;
     void set_color(const std::vector<double>& color);
 
     SurfaceProblem m_problem;
@@ -103,8 +128,10 @@ private:
     std::mutex m_color_lock;
     PerThread<Scratch> m_scratch;
     PerThread<SurfaceTree::Sources> m_sources;
-    double m_beyond_share = 0.0;
-    double m_mean_sources = 0.0;
+    SurfaceTree::Opening m_opening;
+    std::array<float, 3> m_brightest{};  // [result] radiant exitance
+    std::vector<std::uint8_t> m_is_beyond;  // [sample]
+    std::size_t m_pairs = 0;
 };
 
 }  // namespace beamspread

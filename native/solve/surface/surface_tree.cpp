@@ -17,7 +17,7 @@ namespace beamspread {
 
 namespace {
 
-// Samples of a leaf, at most. They share their sources. More: fewer searches, more pairs.
+// Samples of a leaf, at most: as many as share their sources where all are targets.
 constexpr std::size_t leaf_size = PairTargets::most;
 
 // Samples of the smallest clusters, at most: leaves of more are parted once more. More: less memory, more pairs.
@@ -27,24 +27,8 @@ constexpr std::size_t tip_size = 4;
 // More: fuller leaves, and clusters that look less like squares.
 constexpr std::size_t parted_size = 128;
 
-// Weight of the variance of a cluster's normals beside the squared size over the distance. More: smaller errors where a
-// surface bends, more pairs.
-constexpr float normal_weight = 3.0f;
-
 // Mean squared distance of the points of a sample, a disk, from its middle, over its area.
 constexpr float sample_spread = 0.5f * static_cast<float>(inv_pi);
-
-// Largest radius of a cluster over its distance. More: fewer pairs, larger errors near large clusters.
-constexpr float max_radius = 0.7f;
-
-// Weight of the fourth power of a cluster's size: `spread` corrects errors of the second. It only moves the bounds that
-// `SurfaceField` tries.
-constexpr float fourth_weight = 25.0f;
-
-// Weight of the squared size, where a cluster faces another way than its targets, beside that of the fourth power. The
-// curvature of pairs across an edge differs from point to point of a cluster, which `spread` does not correct. More:
-// fewer clusters across edges, and larger errors that `SurfaceField` allows elsewhere. 0: blocks take 8 times as long.
-constexpr float edge_weight = 16.0f;
 
 // Samples of one work item.
 constexpr std::size_t at_once = 1024;
@@ -120,15 +104,6 @@ void set_frame(const Vec3f& normal, PairSource& cluster)
     cluster.binormal = glm::cross(axis, cluster.tangent);
 }
 
-// Difference of a cluster's normal from that of its targets, less the difference of a body that bends on as the cluster
-// does: pairs of a ball have one curvature. 0 on planes and balls.
-float turn_of_edge(const Vec3f& difference, float variance, float spread, float squared_distance)
-{
-    if (!(spread > 0.0f))
-        return glm::length(difference);
-    return std::sqrt(std::max(0.0f, glm::dot(difference, difference) - variance * squared_distance / spread));
-}
-
 }  // namespace
 
 SurfaceTree::SurfaceTree(std::span<const SurfaceSample> samples)
@@ -142,7 +117,7 @@ SurfaceTree::SurfaceTree(std::span<const SurfaceSample> samples)
     m_codes.resize(samples.size());
     for (std::size_t i = 0; i < samples.size(); ++i)
         std::tie(m_codes[i], m_order[i]) = order[i];
-    build(0, samples.size(), false);
+    build(0, samples.size());
     m_codes = {};
 }
 
@@ -156,20 +131,17 @@ SurfaceTree::Box SurfaceTree::box_of(std::size_t begin, std::size_t end) const
     return box;
 }
 
-SurfaceTree::Box SurfaceTree::build(std::size_t begin, std::size_t end, bool is_in_leaf)
+SurfaceTree::Box SurfaceTree::build(std::size_t begin, std::size_t end)
 {
     const auto number = static_cast<std::uint32_t>(m_nodes.size());
     m_nodes.push_back({.begin = static_cast<std::uint32_t>(begin), .end = static_cast<std::uint32_t>(end)});
-    if (end - begin <= leaf_size && !is_in_leaf)
-        m_leaves.push_back(number);
     const bool is_parted = end - begin <= parted_size;  // else the boxes of its parts tell its own
     Box box = is_parted ? box_of(begin, end) : Box{};
     if (end - begin > tip_size) {
         const std::size_t middle = is_parted ? part_by_place(begin, end, box) : part_by_code(begin, end);
-        const bool are_in_leaf = end - begin <= leaf_size;
-        const Box first = build(begin, middle, are_in_leaf);
+        const Box first = build(begin, middle);
         m_nodes[number].second = static_cast<std::uint32_t>(m_nodes.size());
-        const Box second = build(middle, end, are_in_leaf);
+        const Box second = build(middle, end);
         if (!is_parted)
             box = {glm::min(first.low, second.low), glm::max(first.high, second.high)};
     }
@@ -211,16 +183,13 @@ void SurfaceTree::weigh(const SurfaceBasis& basis, const PairTables& tables, con
 {
     const std::size_t stride = basis.lanes.moments();
     m_set_scales.assign(basis.terms.sets.count(), 0.0f);
-    std::vector<std::size_t> first(m_set_scales.size());  // [set] of the moments of the first function
+    m_first_places.resize(m_set_scales.size());
     for (std::size_t result = 0; result < basis.lanes.results; ++result)
-        first[basis.terms.sets.results[result].set] = basis.lanes.place(result, 0);
-    const auto light = [&](std::size_t sample, std::size_t set) {
-        return std::abs(moments[sample * stride + first[set]]);
-    };
+        m_first_places[basis.terms.sets.results[result].set] = basis.lanes.place(result, 0);
     for (std::size_t set = 0; set < m_set_scales.size(); ++set) {
         float most = 0.0f;
         for (std::size_t i = 0; i < m_samples.size(); ++i)
-            most = std::max(most, light(i, set));
+            most = std::max(most, light(moments, stride, i, set));
         m_set_scales[set] = most > 0.0f ? 1.0f / most : 0.0f;
     }
     parallel_for(m_samples.size() / at_once + 1, [&](std::size_t item) {
@@ -229,29 +198,11 @@ void SurfaceTree::weigh(const SurfaceBasis& basis, const PairTables& tables, con
             const bool is_lit = std::any_of(all, all + stride, [](float value) { return value != 0.0f; });
             float sum = 0.0f;
             for (std::size_t set = 0; set < m_set_scales.size(); ++set)
-                sum += m_set_scales[set] * light(i, set);
+                sum += m_set_scales[set] * light(moments, stride, i, set);
             m_weights[i] = is_lit ? std::max(sum * m_samples[i].area, std::numeric_limits<float>::min()) : 0.0f;
             m_disks[i] = static_cast<std::uint32_t>(tables.disk(m_samples[i].area));
         }
     });
-}
-
-std::vector<std::size_t> SurfaceTree::probed_leaves(std::size_t bright, std::size_t even) const
-{
-    std::vector<std::size_t> leaves(m_leaves.size());
-    std::iota(leaves.begin(), leaves.end(), std::size_t{0});
-    if (leaves.size() <= bright + even)
-        return leaves;
-    const auto brighter = [&](std::size_t a, std::size_t b) {
-        const float first = m_nodes[m_leaves[a]].weight;
-        const float second = m_nodes[m_leaves[b]].weight;
-        return first != second ? first > second : a < b;
-    };
-    std::nth_element(leaves.begin(), leaves.begin() + static_cast<std::ptrdiff_t>(bright), leaves.end(), brighter);
-    leaves.resize(bright);
-    for (std::size_t i = 0; i < even; ++i)
-        leaves.push_back((2 * i + 1) * m_leaves.size() / (2 * even));
-    return leaves;
 }
 
 void SurfaceTree::list_lit()
@@ -384,111 +335,6 @@ void SurfaceTree::gather_children(const SurfaceBasis& basis, const std::vector<f
     }
     cluster.spread = spread / node.weight;
     cluster.bend = bend / node.weight;
-}
-
-std::size_t SurfaceTree::Sources::count() const
-{
-    std::size_t sum = clusters.size();
-    for (const std::span<const PairSource> near : samples)
-        sum += near.size();
-    return sum;
-}
-
-Vec3f SurfaceTree::mean_normal(std::size_t begin, std::size_t end) const
-{
-    Vec3f sum(0.0f);
-    for (std::size_t leaf = begin; leaf < end; ++leaf)
-        for (const std::uint32_t i : samples_of(leaf))
-            sum += m_samples[i].normal;
-    const float length = glm::length(sum);
-    return length > 0.0f ? sum / length : sum;
-}
-
-// A cluster that is far is so from farther away, too, but for steps of the bound.
-bool SurfaceTree::is_far(const Node& node, float distance, const Vec3f& normal, const Opening& opening)
-{
-    if (distance <= 0.0f || node.light_radius > max_radius * distance)
-        return false;
-    const float square = distance * distance;
-    const float variance = node.variance();
-    const float size = node.spread + normal_weight * variance * square;
-    if (opening.size > 0.0f)
-        return size <= opening.size * opening.size * square;
-    const std::uint32_t step = chord_step(distance - node.light_radius);
-    if (opening.bound.empty() || step < opening.first)
-        return false;
-    const std::size_t row = std::min<std::size_t>(step - opening.first, opening.bound.size() - 1);
-    const float of_size = fourth_weight * size / square;
-    const auto is_small = [&](float error) { return error * size * node.weight * opening.bound[row] <= 1.0f; };
-    // Most clusters that are too large are so without a turn, which takes longer to find.
-    return is_small(of_size) &&
-           is_small(of_size + edge_weight * turn_of_edge(node.normal - normal, variance, node.spread, square));
-}
-
-void SurfaceTree::find_candidates(std::size_t begin, std::size_t end, const Opening& opening, float reach,
-                                  Sources& sources) const
-{
-    // A ball around all targets.
-    Vec3f low(std::numeric_limits<float>::infinity());
-    Vec3f high = -low;
-    for (std::size_t leaf = begin; leaf < end; ++leaf) {
-        const Node& target = m_nodes[m_leaves[leaf]];
-        low = glm::min(low, target.middle - target.radius);
-        high = glm::max(high, target.middle + target.radius);
-    }
-    const Vec3f middle = 0.5f * (low + high);
-    const float radius = 0.5f * glm::length(high - low);
-    const Vec3f normal = mean_normal(begin, end);
-    sources.candidates.clear();
-    sources.shared.clear();
-    sources.waiting.assign(1, 0);
-    while (!sources.waiting.empty()) {
-        const std::uint32_t number = sources.waiting.back();
-        sources.waiting.pop_back();
-        const Node& node = m_nodes[number];
-        const float distance = glm::length(node.light - middle);
-        if (node.weight == 0.0f || distance - radius - node.light_radius > reach)
-            continue;
-        if (is_far(node, distance - radius, normal, opening)) {
-            sources.shared.push_back(&m_clusters[number]);
-            continue;
-        }
-        // A leaf stays whole: it may be one of the targets.
-        if (node.end - node.begin <= leaf_size || is_far(node, distance + radius, normal, opening)) {
-            sources.candidates.push_back(number);
-        } else {
-            sources.waiting.push_back(node.second);
-            sources.waiting.push_back(number + 1);
-        }
-    }
-}
-
-void SurfaceTree::find(std::size_t leaf, const Opening& opening, float reach, Sources& sources) const
-{
-    sources.samples.clear();
-    sources.clusters = sources.shared;
-    const Node& target = m_nodes[m_leaves[leaf]];
-    const Vec3f normal = mean_normal(leaf, leaf + 1);
-    sources.samples.push_back(lit_samples(target));
-    sources.waiting.assign(sources.candidates.rbegin(), sources.candidates.rend());
-    while (!sources.waiting.empty()) {
-        const std::uint32_t number = sources.waiting.back();
-        sources.waiting.pop_back();
-        const Node& node = m_nodes[number];
-        if (node.weight == 0.0f || number == m_leaves[leaf])
-            continue;
-        const float distance = glm::length(node.light - target.middle) - target.radius;
-        if (distance - node.light_radius > reach)
-            continue;
-        if (is_far(node, distance, normal, opening)) {
-            sources.clusters.push_back(&m_clusters[number]);
-        } else if (node.second == 0) {
-            sources.samples.push_back(lit_samples(node));
-        } else {
-            sources.waiting.push_back(node.second);
-            sources.waiting.push_back(number + 1);
-        }
-    }
 }
 
 }  // namespace beamspread

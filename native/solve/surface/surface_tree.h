@@ -33,14 +33,23 @@ public:
 
     // Number of nodes, which need moments besides those of the samples.
     std::size_t nodes() const { return m_nodes.size(); }
-    std::size_t leaves() const { return m_leaves.size(); }
 
-    // Numbers of a leaf's samples.
-    std::span<const std::uint32_t> samples_of(std::size_t leaf) const
-    {
-        const Node& node = m_nodes[m_leaves[leaf]];
-        return std::span(m_order).subspan(node.begin, node.end - node.begin);
-    }
+    // Samples near to each other that are solved together: they share their sources.
+    struct Group {
+        std::span<const std::uint32_t> samples;  // at most `PairTargets::most`
+        Vec3f middle;
+        float radius = 0.0f;  // of the samples around their middle, metres
+        float weight = 0.0f;  // of the light of the samples around; after `gather`
+    };
+
+    // Groups of some samples, each in one group; neighbors follow each other.
+    struct Targets {
+        std::vector<std::uint32_t> samples;
+        std::vector<Group> groups;
+    };
+
+    // `is_wanted`: [sample] not 0 for those that the groups have; empty: all.
+    Targets targets(std::span<const std::uint8_t> is_wanted) const;
 
     // Whether any light reaches a sample; after `gather`.
     bool is_lit(std::size_t sample) const { return m_weights[sample] > 0.0f; }
@@ -48,18 +57,21 @@ public:
     // Factors from a set's light, irradiance times u(theta) of the first function, to the weights of clusters.
     const std::vector<float>& set_scales() const { return m_set_scales; }
 
-    // The brightest leaves, and some evenly spread.
-    std::vector<std::size_t> probed_leaves(std::size_t bright, std::size_t even) const;
+    // Light that enters at a sample by the first function of a set; after `gather`.
+    float light(const std::vector<float>& moments, std::size_t stride, std::size_t sample, std::size_t set) const
+    {
+        return std::abs(moments[sample * stride + m_first_places[set]]);
+    }
 
     // Gathers the light of all samples in clusters. `moments`: [sample], then [node], as in `SurfaceBasis`; those of
     // nodes are written.
     void gather(const SurfaceBasis& basis, const PairTables& tables, std::vector<float>& moments);
 
-    // Light that reaches a leaf: its own lit samples come first.
+    // Light that reaches a group.
     struct Sources : PairSources {
         std::size_t count() const;
 
-        std::vector<const ClusterSource*> shared;  // clusters that are far from all leaves side by side
+        std::vector<const ClusterSource*> shared;  // clusters that are far from all groups side by side
         std::vector<std::uint32_t> candidates;     // nodes that may be sources of some of these
         std::vector<std::uint32_t> waiting;        // working memory
     };
@@ -73,13 +85,12 @@ public:
                                    // its squared distance); empty: none is far
     };
 
-    // Finds the nodes among which `find` looks for the sources of leaves [begin, end), side by side; light from beyond
-    // `reach` (metres) is left out.
-    void find_candidates(std::size_t begin, std::size_t end, const Opening& opening, float reach,
-                         Sources& sources) const;
+    // Finds the nodes among which `find` looks for the sources of groups side by side; light from beyond `reach` (metres)
+    // is left out.
+    void find_candidates(std::span<const Group> groups, const Opening& opening, float reach, Sources& sources) const;
 
-    // Finds the sources of one of these leaves.
-    void find(std::size_t leaf, const Opening& opening, float reach, Sources& sources) const;
+    // Finds the sources of one of these groups.
+    void find(const Group& group, const Opening& opening, float reach, Sources& sources) const;
 
 private:
     // One line of the cache.
@@ -113,13 +124,14 @@ private:
     };
 
     static bool place(Node& node, ClusterSource& cluster, std::span<const Part> parts);
-    // Sum of the normals of the samples of leaves [begin, end), over its length.
-    Vec3f mean_normal(std::size_t begin, std::size_t end) const;
+    Group group_of(std::span<const std::uint32_t> samples, const Node& node) const;
+    // Sum of the normals of the samples of groups, over its length.
+    Vec3f mean_normal(std::span<const Group> groups) const;
     // `normal`: mean of the targets.
     static bool is_far(const Node& node, float distance, const Vec3f& normal, const Opening& opening);
     void weigh(const SurfaceBasis& basis, const PairTables& tables, const std::vector<float>& moments);
     Box box_of(std::size_t begin, std::size_t end) const;
-    Box build(std::size_t begin, std::size_t end, bool is_in_leaf);
+    Box build(std::size_t begin, std::size_t end);
     std::size_t part_by_place(std::size_t begin, std::size_t end, const Box& box);
     std::size_t part_by_code(std::size_t begin, std::size_t end) const;
     void list_lit();
@@ -134,8 +146,8 @@ private:
     std::vector<ClusterSource> m_clusters;  // [node]
     std::vector<PairSource> m_lit;          // lit samples in the tree's order
     std::vector<std::uint32_t> m_lit_before;  // [place in the tree's order] number of lit samples before
-    std::vector<std::uint32_t> m_leaves;
     std::vector<float> m_set_scales;
+    std::vector<std::size_t> m_first_places;  // [set] of the first function among a sample's moments
     std::vector<float> m_weights;       // [sample] of its light; 0: dark
     std::vector<std::uint32_t> m_disks;  // [sample]
 };

@@ -1,0 +1,53 @@
+// Luminance of the texels of a mesh that bends, from the light on its samples.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "bake/bake.h"
+#include "bake/nested_texels.h"
+#include "base/progress.h"
+#include "scene/receiver.h"
+#include "solve/surface/surface_field.h"
+
+namespace beamspread {
+
+// Solves all texels, or few: texels at steps of 4, those between where light or the mesh changes from texel to texel, and
+// more around where luminance is not as that of the larger step tells (sparse point representation, Holmström 1999,
+// doi:10.1137/S1064827597316278). The others are interpolated, which is off by about the field's tolerance at most.
+class BentSolution {
+public:
+    // `first`: [texel] its first sample, and the number of all. `texels`: null solves all. All are viewed.
+    BentSolution(const ReceiverGrid& grid, std::span<const std::size_t> first, const NestedTexels* texels);
+
+    // Part of the samples that are solved at least.
+    double least_part() const;
+
+    // Writes [texel][channel]; 0 outside of the mesh. Rays have been added to the field. Throws Cancelled.
+    void solve(SurfaceField& field, double tolerance, Progress& progress, float* luminance);
+
+    // After `solve`.
+    BentShares shares() const;
+
+private:
+    using Mask = std::vector<std::uint8_t>;  // [texel]
+    struct Light;
+
+    bool is_first(std::size_t texel) const;
+    std::size_t samples_of(std::size_t texel) const { return m_first[texel + 1] - m_first[texel]; }
+    std::size_t find_wanted(std::size_t step, const Mask& is_rough, Mask& is_wanted) const;
+    void mark_changes(std::size_t step, const Light& light, Mask& is_rough) const;
+    void mark_differences(std::size_t step, const Light& light, const float* luminance, Mask& is_rough) const;
+    void solve_some(const Mask& is_wanted, SurfaceField& field, Progress& progress, float* luminance);
+    void interpolate(std::size_t step, std::size_t channels, float* luminance);
+
+    const ReceiverGrid& m_grid;
+    std::span<const std::size_t> m_first;
+    const NestedTexels* m_texels;
+    Mask m_is_solved, m_is_beyond;
+    std::vector<float> m_values;  // [sample][channel]
+};
+
+}  // namespace beamspread
