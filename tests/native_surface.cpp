@@ -4,6 +4,7 @@
 #include <cmath>
 #include <cstdint>
 #include <memory>
+#include <numeric>
 #include <string>
 #include <utility>
 #include <vector>
@@ -50,9 +51,8 @@ public:
                 for (std::size_t q = 0; q < gauss_node.size(); ++q) {
                     const double r = inner + half * (1.0 + gauss_node[q]);
                     for (std::size_t m = 0; m < harmonics; ++m)
-                        moments[m * edge_count + edge] +=
-                            gauss_weight[q] * half * r * (m == 0 ? 2.0 * pi : pi) *
-                            density(m, r, angle, albedo, m_curvatures[curvature]);
+                        moments[m * edge_count + edge] += gauss_weight[q] * half * r * (m == 0 ? 2.0 * pi : pi) *
+                                                          density(m, r, angle, albedo, m_curvatures[curvature]);
                 }
                 inner = radial_edge(edge);
             }
@@ -97,7 +97,8 @@ class HeldField {
 public:
     HeldField(const py::array& samples, const Sources& ldf, const std::vector<double>& albedo,
               const std::vector<double>& mean_free_path, double tolerance, double max_angle, bool is_colored,
-              int threads, std::size_t max_moment_bytes, bool is_direct, const std::string& side, const py::array& steps)
+              int threads, std::size_t max_moment_bytes, bool is_direct, const std::string& side,
+              const py::array& steps)
         : m_samples(samples), m_steps(steps), m_ldf(ldf)
     {
         SurfaceProblem problem;
@@ -127,7 +128,9 @@ public:
         if (power.size() != rays.size() || first + rays.size() > static_cast<std::size_t>(m_samples.shape(0)))
             reject("irradiance", shape_text(irradiance), "a row for each ray, one ray for each sample");
         const py::gil_scoped_release release;
-        m_field->add(first, rays.size(), rays.data(), power.data(), color);
+        std::vector<std::uint32_t> samples(rays.size());
+        std::iota(samples.begin(), samples.end(), static_cast<std::uint32_t>(first));
+        m_field->add(samples, rays.data(), power.data(), color);
     }
 
     Array<float> solve(const py::object& progress)

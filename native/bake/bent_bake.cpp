@@ -31,34 +31,58 @@ constexpr double tables_work = 1e6;
 constexpr double pairs_work = 40.0;
 constexpr double reach_power = 0.6;
 
+// Cosine of the angle to the normal, at least, of light at a texel in the frame of a sample of several texels.
+constexpr float least_fall = 1e-3f;
+
 // Adds rays at texels to a field of samples.
 class SampleSink final : public RaySink {
 public:
-    SampleSink(const BentSamples& samples, const std::vector<double>& color, SurfaceField& field)
-        : m_samples(samples), m_color(color), m_field(field)
+    SampleSink(const ReceiverGrid& grid, const BentSamples& samples, const std::vector<double>& color,
+               SurfaceField& field)
+        : m_grid(grid), m_samples(samples), m_color(color), m_field(field)
     {
     }
 
     void add(const RayRun& run) override
     {
         Scratch& scratch = m_scratch.local();
+        scratch.samples.clear();
         scratch.travel.clear();
         scratch.irradiance.clear();
         for (std::size_t i = 0; i < run.count; ++i) {
-            const std::size_t pieces = m_samples.first[run.sample + i + 1] - m_samples.first[run.sample + i];
-            scratch.travel.insert(scratch.travel.end(), pieces, run.travel[i]);
-            scratch.irradiance.insert(scratch.irradiance.end(), pieces, run.irradiance[i]);
+            const BentSamples::Range& range = m_samples.of_texel[run.sample + i];
+            Vec3f travel = run.travel[i];
+            Vec3f irradiance = run.irradiance[i];
+            if (const BentSamples::Run* const of_many = m_samples.run_of(run.sample + i)) {
+                const BentTexel& texel = m_grid.bent_texel(run.sample + i);
+                irradiance *= texel.area / of_many->area;
+                travel = in_frame(m_samples.all[range.begin], texel, travel);
+            }
+            for (std::uint32_t k = 0; k < range.count; ++k)
+                scratch.samples.push_back(range.begin + k);
+            scratch.travel.insert(scratch.travel.end(), range.count, travel);
+            scratch.irradiance.insert(scratch.irradiance.end(), range.count, irradiance);
         }
-        if (!scratch.travel.empty())
-            m_field.add(m_samples.first[run.sample], scratch.travel.size(), scratch.travel.data(),
-                        scratch.irradiance.data(), m_color);
+        m_field.add(scratch.samples, scratch.travel.data(), scratch.irradiance.data(), m_color);
     }
 
 private:
     struct Scratch {
+        std::vector<std::uint32_t> samples;
         std::vector<Vec3f> travel, irradiance;
     };
 
+    // A direction of a texel's frame in that of a sample of several texels; below its horizon.
+    static Vec3f in_frame(const SurfaceSample& sample, const BentTexel& texel, const Vec3f& travel)
+    {
+        const Vec3f world =
+            travel.x * texel.tangent + travel.y * glm::cross(texel.normal, texel.tangent) + travel.z * texel.normal;
+        const Vec3f turned(glm::dot(world, sample.tangent), glm::dot(world, glm::cross(sample.normal, sample.tangent)),
+                           glm::dot(world, sample.normal));
+        return glm::normalize(Vec3f(turned.x, turned.y, std::min(turned.z, -least_fall)));
+    }
+
+    const ReceiverGrid& m_grid;
     const BentSamples& m_samples;
     const std::vector<double>& m_color;
     SurfaceField& m_field;
@@ -185,7 +209,7 @@ BentShares bake_bent(const Surface& surface, const std::vector<const SurfaceLigh
     std::optional<NestedTexels> nested;
     if (options.solver != Solver::direct && !is_transmitted(channels))
         nested.emplace(surface.grid, samples.whole_texels(surface));
-    BentSolution solution(surface.grid, samples.first, nested ? &*nested : nullptr);
+    BentSolution solution(surface.grid, samples, nested ? &*nested : nullptr);
     const double pairs = pair_work(samples, channels) * solution.least_part();
     progress.set_total(std::accumulate(works.begin(), works.end(), tables + pairs));
     const SurfaceProblem problem{.samples = samples.all,
@@ -202,7 +226,7 @@ BentShares bake_bent(const Surface& surface, const std::vector<const SurfaceLigh
     progress.advance_by(tables, [&](Progress& part) { field = std::make_unique<SurfaceField>(problem, part); });
     for (std::size_t i = 0; i < lights.size(); ++i)
         progress.advance_by(works[i], [&](Progress& part) {
-            SampleSink sink(samples, lights[i]->color, *field);
+            SampleSink sink(surface.grid, samples, lights[i]->color, *field);
             lights[i]->gather(surface, options.ray_settings(rays[i]), sink, part);
         });
     progress.advance_by(pairs, [&](Progress& part) { solution.solve(*field, options.tolerance, part, luminance); });

@@ -67,14 +67,14 @@ struct BentSolution::Light {
     std::vector<float> brightest;  // [channel] largest luminance
 };
 
-BentSolution::BentSolution(const ReceiverGrid& grid, std::span<const std::size_t> first, const NestedTexels* texels)
-    : m_grid(grid), m_first(first), m_texels(texels)
+BentSolution::BentSolution(const ReceiverGrid& grid, const BentSamples& samples, const NestedTexels* texels)
+    : m_grid(grid), m_samples(samples), m_texels(texels)
 {
 }
 
 bool BentSolution::is_first(std::size_t texel) const
 {
-    if (m_texels == nullptr || !m_texels->is_whole(texel))
+    if (m_texels == nullptr || !m_texels->is_whole(texel) || m_samples.run_of(texel) != nullptr)
         return true;
     constexpr std::size_t step = NestedTexels::steps.front();
     return texel % m_grid.width % step == 0 && texel / m_grid.width % step == 0;
@@ -83,9 +83,11 @@ bool BentSolution::is_first(std::size_t texel) const
 double BentSolution::least_part() const
 {
     std::size_t count = 0;
-    for (std::size_t i = 0; i < m_grid.texels(); ++i)
-        count += is_first(i) ? samples_of(i) : 0;
-    return static_cast<double>(count) / static_cast<double>(m_first.back());
+    for (std::size_t i = 0; i < m_grid.texels(); ++i) {
+        const BentSamples::Run* const run = m_samples.run_of(i);
+        count += is_first(i) && (run == nullptr || run->first == i) ? m_samples.of_texel[i].count : 0;
+    }
+    return static_cast<double>(count) / static_cast<double>(m_samples.all.size());
 }
 
 // Marks texels of a step where light or normals change.
@@ -103,8 +105,8 @@ void BentSolution::mark_changes(std::size_t step, const Light& light, Mask& is_r
             for (std::size_t i = y * m_grid.width; i < (y + 1) * m_grid.width; ++i) {
                 if (!m_texels->is_whole(i))
                     continue;
-                near[i * results + r] = light.field.exitance_within(of_step, m_first[i], r);
-                all[i * results + r] = light.field.exitance_within(of_all, m_first[i], r);
+                near[i * results + r] = light.field.exitance_within(of_step, m_samples.of_texel[i].begin, r);
+                all[i * results + r] = light.field.exitance_within(of_all, m_samples.of_texel[i].begin, r);
             }
         });
     }
@@ -159,28 +161,42 @@ std::size_t BentSolution::find_wanted(std::size_t step, const Mask& is_rough, Ma
             continue;
         if (step != NestedTexels::steps.front() && (is_rough[i] == 0 || m_is_solved[i] != 0))
             continue;
-        std::fill_n(is_wanted.begin() + static_cast<std::ptrdiff_t>(m_first[i]), samples_of(i), std::uint8_t{1});
-        count += samples_of(i);
+        const BentSamples::Range& range = m_samples.of_texel[i];
+        for (std::uint32_t k = range.begin; k < range.begin + range.count; ++k) {
+            count += is_wanted[k] == 0 ? 1 : 0;
+            is_wanted[k] = 1;
+        }
     }
     return count;
 }
 
+// Mean of a texel's pieces.
+float BentSolution::mean_of(std::size_t texel, std::size_t channel, std::size_t channels) const
+{
+    const BentSamples::Range& range = m_samples.of_texel[texel];
+    float sum = 0.0f;
+    for (std::size_t k = range.begin; k < range.begin + range.count; ++k)
+        sum += m_values[k * channels + channel];
+    return sum / static_cast<float>(range.count);
+}
+
 void BentSolution::solve_some(const Mask& is_wanted, SurfaceField& field, Progress& progress, float* luminance)
 {
-    const std::size_t channels = m_values.size() / m_first.back();
+    const std::size_t channels = m_values.size() / m_samples.all.size();
     field.solve(is_wanted, progress, m_values.data());
-    // The luminance of a texel is the mean of its pieces.
     parallel_for(m_grid.height, [&](std::size_t y) {
         for (std::size_t i = y * m_grid.width; i < (y + 1) * m_grid.width; ++i) {
-            if (samples_of(i) == 0 || is_wanted[m_first[i]] == 0)
+            const BentSamples::Range& range = m_samples.of_texel[i];
+            if (range.count == 0 || is_wanted[range.begin] == 0)
                 continue;
             m_is_solved[i] = 1;
-            std::fill_n(luminance + i * channels, channels, 0.0f);
-            for (std::size_t k = m_first[i]; k < m_first[i + 1]; ++k) {
+            for (std::uint32_t k = range.begin; k < range.begin + range.count; ++k)
                 if (field.is_beyond(k))
                     m_is_beyond[i] = 1;
-                for (std::size_t c = 0; c < channels; ++c)
-                    luminance[i * channels + c] += m_values[k * channels + c] / static_cast<float>(samples_of(i));
+            const auto [beside, weight] = m_samples.beside(i);
+            for (std::size_t c = 0; c < channels; ++c) {
+                const float own = mean_of(i, c, channels);
+                luminance[i * channels + c] = weight > 0.0f ? own + weight * (mean_of(beside, c, channels) - own) : own;
             }
         }
     });
@@ -209,9 +225,9 @@ void BentSolution::solve(SurfaceField& field, double tolerance, Progress& progre
     field.gather();
     const Light light{field, static_cast<float>(tolerance), field.brightest()};
     const std::size_t channels = light.brightest.size();
-    m_values.assign(m_first.back() * channels, 0.0f);
+    m_values.assign(m_samples.all.size() * channels, 0.0f);
     std::fill_n(luminance, texels * channels, 0.0f);
-    Mask is_wanted(m_first.back(), 1);
+    Mask is_wanted(m_samples.all.size(), 1);
     if (m_texels == nullptr) {
         solve_some(is_wanted, field, progress, luminance);
         return;
@@ -256,7 +272,7 @@ BentShares BentSolution::shares() const
     double solved = 0.0;
     double texels = 0.0;
     for (std::size_t i = 0; i < m_is_solved.size(); ++i) {
-        if (samples_of(i) == 0)
+        if (!has_samples(i))
             continue;
         const auto of_texel = static_cast<double>(m_grid.bent_texel(i).area);
         area += of_texel;

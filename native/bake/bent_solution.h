@@ -3,10 +3,10 @@
 
 #include <cstddef>
 #include <cstdint>
-#include <span>
 #include <vector>
 
 #include "bake/bake.h"
+#include "bake/bent_samples.h"
 #include "bake/nested_texels.h"
 #include "base/progress.h"
 #include "scene/receiver.h"
@@ -19,8 +19,8 @@ namespace beamspread {
 // doi:10.1137/S1064827597316278). The others are interpolated, which is off by about the field's tolerance at most.
 class BentSolution {
 public:
-    // `first`: [texel] its first sample, and the number of all. `texels`: null solves all. All are viewed.
-    BentSolution(const ReceiverGrid& grid, std::span<const std::size_t> first, const NestedTexels* texels);
+    // `texels`: null solves all. All are viewed.
+    BentSolution(const ReceiverGrid& grid, const BentSamples& samples, const NestedTexels* texels);
 
     // Part of the samples that are solved at least.
     double least_part() const;
@@ -36,7 +36,8 @@ private:
     struct Light;
 
     bool is_first(std::size_t texel) const;
-    std::size_t samples_of(std::size_t texel) const { return m_first[texel + 1] - m_first[texel]; }
+    bool has_samples(std::size_t texel) const { return m_samples.of_texel[texel].count > 0; }
+    float mean_of(std::size_t texel, std::size_t channel, std::size_t channels) const;
     std::size_t find_wanted(std::size_t step, const Mask& is_rough, Mask& is_wanted) const;
     void mark_changes(std::size_t step, const Light& light, Mask& is_rough) const;
     void mark_differences(std::size_t step, const Light& light, const float* luminance, Mask& is_rough) const;
@@ -44,7 +45,7 @@ private:
     void interpolate(std::size_t step, std::size_t channels, float* luminance);
 
     const ReceiverGrid& m_grid;
-    std::span<const std::size_t> m_first;
+    const BentSamples& m_samples;
     const NestedTexels* m_texels;
     Mask m_is_solved, m_is_beyond;
     std::vector<float> m_values;  // [sample][channel]

@@ -1,6 +1,5 @@
 #include "bake/nested_texels.h"
 
-#include <cmath>
 #include <utility>
 
 #include "base/threads.h"
@@ -8,18 +7,6 @@
 namespace beamspread {
 
 namespace {
-
-// Neighbors in the texture are neighbors on the mesh if their distance differs from their steps by less than this part of
-// these, and the cosine of their normals is larger. Larger, smaller: light is interpolated across seams and sharp edges.
-constexpr double largest_gap = 0.25;
-constexpr float least_neighbor_cosine = 0.9f;
-
-bool are_neighbors(const BentTexel& a, const BentTexel& b, Vec3f BentTexel::* step)
-{
-    const Vec3 expected = 0.5 * Vec3(a.*step + b.*step);
-    return glm::length(b.position - a.position - expected) <= largest_gap * glm::length(expected) &&
-           glm::dot(a.normal, b.normal) >= least_neighbor_cosine;
-}
 
 // Adds the interpolation along a line of texels, at `place` of `count`.
 void add_line(const std::vector<std::uint32_t>& runs, std::size_t texel, std::size_t stride, std::size_t place,

@@ -18,6 +18,11 @@ constexpr double unit_tolerance = 1e-3;
 // Smallest sine of the angle between a tangent and its normal; below, the tangent's direction is rounding.
 constexpr double min_sine = 1e-3;
 
+// Neighbors in the texture are neighbors on the mesh if their distance differs from their steps by less than this part of
+// these, and the cosine of their normals is larger. Larger, smaller: light is interpolated across seams and sharp edges.
+constexpr double largest_gap = 0.25;
+constexpr float least_neighbor_cosine = 0.9f;
+
 void check_unit(const char* name, const Vec3& vector)
 {
     if (!(std::abs(glm::length(vector) - 1.0) <= unit_tolerance))
@@ -55,6 +60,13 @@ double BentTexel::pitch() const
 bool BentTexel::is_mirrored() const
 {
     return glm::dot(glm::cross(Vec3(normal), Vec3(tangent)), Vec3(step_y)) < 0.0;
+}
+
+bool are_neighbors(const BentTexel& a, const BentTexel& b, Vec3f BentTexel::* step)
+{
+    const Vec3 expected = 0.5 * Vec3(a.*step + b.*step);
+    return glm::length(b.position - a.position - expected) <= largest_gap * glm::length(expected) &&
+           glm::dot(a.normal, b.normal) >= least_neighbor_cosine;
 }
 
 BentShape::BentShape(std::vector<BentTexel> all) : texels(std::move(all))

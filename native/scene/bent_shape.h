@@ -39,6 +39,10 @@ struct BentTexel {
     bool is_mirrored() const;
 };
 
+// True if texels side by side in the texture are side by side on the mesh, too, and no sharp edge is between them. `step`:
+// that of the axis along which they lie, a before b.
+bool are_neighbors(const BentTexel& a, const BentTexel& b, Vec3f BentTexel::* step);
+
 // The texels, row by row.
 struct BentShape {
     // Computes `face`, makes tangents orthogonal and clears texels outside of the mesh. Throws InvalidArgument naming the

@@ -194,8 +194,8 @@ def test_the_sides_of_an_image_by_faces_are_those_by_triangles():
     _, _, mesh = grid_of(ball())
     (island,) = mesh.islands
     assert lengths_of_faces(ball()) == pytest.approx(island.lengths, rel=0.01)
-    (chart,) = build_receiver(mesh, *texture_size(mesh, 96)).charts
-    assert pieces_of_faces(ball()) == pytest.approx(chart.grid.pieces, rel=0.1)  # which has few texels at the poles
+    (chart,) = build_receiver(mesh, *texture_size(mesh, 512)).charts  # where the border of the island cuts few texels
+    assert pieces_of_faces(ball()) == pytest.approx(chart.grid.pieces, rel=0.1)
 
 
 def test_light_that_few_texels_face_is_not_behind_the_mesh():

@@ -1,4 +1,4 @@
-"""Stretch of texels: the solver for meshes that bend divides those that are long on the surface (bent_bake.cpp)."""
+"""Stretch of texels: the solver for meshes that bend divides long ones, and joins narrow ones (bent_samples.cpp)."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ island cuts it; as native/bake has them."""
 def pieces_of_texels(
     steps_x: np.ndarray, steps_y: np.ndarray, areas: np.ndarray, coverage: np.ndarray, finer: float = 1.0
 ) -> float:
-    """Mean number of pieces of the texels whose area is not 0, by their steps (..., 3) along columns and rows.
+    """Mean number of samples of the texels whose area is not 0, by their steps (..., 3) along columns and rows.
 
     `finer`: times as many texels along each side are baked; so many times fewer of them lie at the end of an island.
     """
@@ -26,7 +26,9 @@ def pieces_of_texels(
     if not shown.any():
         return 1.0
     is_cut = coverage[shown] < 1
-    pieces = np.minimum(_pieces(*metric), np.where(is_cut, MAX_CUT_PIECES, MAX_PIECES))
+    joined = np.where(is_cut, 1, _joined(*metric[:2], np.mean(areas[shown])))
+    pieces = _pieces(metric[0] * joined**2, metric[1], metric[2] * joined) / joined
+    pieces = np.minimum(pieces, np.where(is_cut, MAX_CUT_PIECES, MAX_PIECES))
     return float(np.average(pieces, weights=np.where(is_cut, 1 / finer, 1.0)))
 
 
@@ -37,8 +39,9 @@ def pieces_of_faces(polygons: Polygons) -> float:
         return 1.0
     lengths = lengths_of_faces(polygons)
     along_u, along_v = (step / length for step, length in zip(steps[:2], lengths))
-    products = [np.einsum("nc,nc->n", a, b) for a, b in ((along_u, along_u), (along_v, along_v), (along_u, along_v))]
-    return float(np.average(_pieces(*products), weights=steps[2]))
+    x, y, xy = [np.einsum("nc,nc->n", a, b) for a, b in ((along_u, along_u), (along_v, along_v), (along_u, along_v))]
+    joined = _joined(x, y, np.average(np.sqrt(np.maximum(x * y - xy**2, 0)), weights=steps[2]))
+    return float(np.average(_pieces(x * joined**2, y, xy * joined) / joined, weights=steps[2]))
 
 
 def lengths_of_faces(polygons: Polygons) -> tuple[float, float]:
@@ -65,6 +68,11 @@ def _steps(polygons: Polygons) -> tuple[np.ndarray, np.ndarray, np.ndarray] | No
     along_u = (sides[0] * v_2[:, None] - sides[1] * v_1[:, None])[shown] / area[shown, None]
     along_v = (sides[1] * u_1[:, None] - sides[0] * u_2[:, None])[shown] / area[shown, None]
     return along_u, along_v, weights[shown]
+
+
+def _joined(x: np.ndarray, y: np.ndarray, area: float) -> np.ndarray:
+    """Numbers of texels of a row that share samples, by the squares of their steps and the mean area."""
+    return np.maximum(np.floor(np.sqrt(np.minimum(y, area) / np.maximum(x, 1e-300))), 1.0)
 
 
 def _pieces(x: np.ndarray, y: np.ndarray, xy: np.ndarray) -> np.ndarray:

@@ -172,7 +172,7 @@ void SurfaceField::set_color(const std::vector<double>& color)
             reject("color", "not proportional to that of earlier rays", "one color, or a field for colors");
 }
 
-void SurfaceField::add(std::size_t first, std::size_t count, const Vec3f* travel, const Vec3f* irradiance,
+void SurfaceField::add(std::span<const std::uint32_t> samples, const Vec3f* travel, const Vec3f* irradiance,
                        const std::vector<double>& color)
 {
     if (m_basis.terms.terms.empty())  // the medium is black
@@ -189,8 +189,8 @@ void SurfaceField::add(std::size_t first, std::size_t count, const Vec3f* travel
             colors[set] = static_cast<float>(color[m_basis.terms.sets.channel(set)]);
     }
     const std::vector<LightTerm>& terms = m_basis.terms.terms;
-    for (std::size_t x = 0; x < count; x += rays_at_once) {
-        const std::size_t rays = std::min(rays_at_once, count - x);
+    for (std::size_t x = 0; x < samples.size(); x += rays_at_once) {
+        const std::size_t rays = std::min(rays_at_once, samples.size() - x);
         BeamRow& beams = scratch.beams;
         for (auto* values : {&beams.irradiance, &beams.cos_beta, &beams.sin_beta, &beams.half_tangent})
             values->resize(rays);
@@ -221,7 +221,7 @@ void SurfaceField::add(std::size_t first, std::size_t count, const Vec3f* travel
         for (std::size_t t = 0; t < terms.size(); ++t) {
             for (const std::size_t at : m_basis.places(t))
                 for (std::size_t i = 0; i < rays; ++i)
-                    m_moments[(first + x + i) * m_basis.lanes.moments() + at] += scratch.values[t * rays + i];
+                    m_moments[samples[x + i] * m_basis.lanes.moments() + at] += scratch.values[t * rays + i];
         }
     }
 }

@@ -50,10 +50,9 @@ public:
     // Views the problem's samples, which must outlive the field. Throws InvalidArgument, MemoryLimit, Cancelled.
     SurfaceField(const SurfaceProblem& problem, Progress& progress);
 
-    // Adds rays, one at each of samples [first, first + count). `travel` has vectors of the sample's frame with z < 0;
-    // the power of a ray is its irradiance, W/m^2, times the color. Several threads may add to different samples at
-    // once.
-    void add(std::size_t first, std::size_t count, const Vec3f* travel, const Vec3f* irradiance,
+    // Adds rays, one at each of some samples. `travel` has vectors of the sample's frame with z < 0; the power of a ray is
+    // its irradiance, W/m^2, times the color. Several threads may add to different samples at once.
+    void add(std::span<const std::uint32_t> samples, const Vec3f* travel, const Vec3f* irradiance,
              const std::vector<double>& color);
 
     // Removes all rays; the basis and tables stay.
