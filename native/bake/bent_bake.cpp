@@ -11,6 +11,7 @@
 #include "bake/bent_solution.h"
 #include "bake/field_bake.h"
 #include "bake/nested_texels.h"
+#include "base/constants.h"
 #include "base/threads.h"
 #include "solve/surface/surface_field.h"
 
@@ -224,12 +225,24 @@ BentShares bake_bent(const Surface& surface, const std::vector<const SurfaceLigh
                                  .is_direct = options.solver == Solver::direct};
     std::unique_ptr<SurfaceField> field;
     progress.advance_by(tables, [&](Progress& part) { field = std::make_unique<SurfaceField>(problem, part); });
+    RayNoise noise;
+    BakeOptions gathering = options;
+    gathering.noise = &noise;
     for (std::size_t i = 0; i < lights.size(); ++i)
         progress.advance_by(works[i], [&](Progress& part) {
             SampleSink sink(surface.grid, samples, lights[i]->color, *field);
-            lights[i]->gather(surface, options.ray_settings(rays[i]), sink, part);
+            lights[i]->gather(surface, gathering.ray_settings(rays[i]), sink, part);
         });
-    progress.advance_by(pairs, [&](Progress& part) { solution.solve(*field, options.tolerance, part, luminance); });
+    if (options.noise)
+        options.noise->add(noise, 1.0);
+    BentSolution::Accuracy accuracy{options.tolerance};
+    if (noise.irradiance > 0.0)
+        accuracy.noise = std::sqrt(noise.variance) / noise.irradiance;
+    for (const ChannelMedium& channel : channels) {
+        const double path = channel.mean_free_path / surface.grid.pitch_x;
+        accuracy.texels.push_back(1.0 + 4.0 * pi * path * path);
+    }
+    progress.advance_by(pairs, [&](Progress& part) { solution.solve(*field, accuracy, part, luminance); });
     progress.finish();
     return solution.shares();
 }

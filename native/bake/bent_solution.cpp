@@ -4,6 +4,7 @@
 #include <array>
 #include <cmath>
 #include <limits>
+#include <numeric>
 
 #include "base/threads.h"
 
@@ -15,11 +16,18 @@ namespace {
 // of the normals, and of the luminance by light that leaves within as many texels of where it enters as the step is wide.
 // Those of luminance are relative to `visible_scale`. Larger: fewer texels, larger errors.
 constexpr float largest_difference = 0.7f;
-constexpr float largest_turn = 2.0f;
+constexpr float largest_turn = 8.0f;
 constexpr float largest_change = 1.0f;
 
 // Luminance, over the largest one, that counts as black. Smaller: more texels are solved where it is dark.
 constexpr float black = 1e-3f;
+
+// Differences over the standard deviation of noise up to which they count as noise, where the medium spreads it farther than
+// the texels that tell the others. Larger: fewer texels, and lights of a size whose shadows are less exact.
+constexpr double noisy = 6.0;
+
+// Part of the samples from which on all are solved at once: the sources of texels side by side are found faster.
+constexpr double most_part = 0.7;
 
 // Number of texels of a step on each side of such a texel that are solved, too: as many as cubics reach.
 constexpr std::size_t spread_texels = 2;
@@ -63,8 +71,16 @@ void spread_marks(const NestedTexels& texels, std::size_t step, std::vector<std:
 // What decides about texels.
 struct BentSolution::Light {
     const SurfaceField& field;
+    Accuracy accuracy;
     float tolerance;
     std::vector<float> brightest;  // [channel] largest luminance
+
+    // Standard deviations that count as noise at texels that are told by others at twice a step, over the mean.
+    double noise(std::size_t step) const
+    {
+        const double least = *std::min_element(accuracy.texels.begin(), accuracy.texels.end());
+        return least >= 4.0 * static_cast<double>(step * step) ? noisy * accuracy.noise : 0.0;
+    }
 };
 
 BentSolution::BentSolution(const ReceiverGrid& grid, const BentSamples& samples, const NestedTexels* texels)
@@ -110,6 +126,9 @@ void BentSolution::mark_changes(std::size_t step, const Light& light, Mask& is_r
             }
         });
     }
+    std::vector<float> noise;  // [result]
+    for (std::size_t r = 0; r < results; ++r)
+        noise.push_back(static_cast<float>(light.noise(step) * mean_of(near, r, results)));
     m_texels->for_each(step, [&](const NestedTexels::Place& place) {
         const std::size_t texel = place.y * m_grid.width + place.x;
         const Stencil stencil = m_texels->stencil(place, step);
@@ -122,7 +141,7 @@ void BentSolution::mark_changes(std::size_t step, const Light& light, Mask& is_r
         for (std::size_t r = 0; r < results && !changes; ++r) {
             const auto near_of = [&](std::size_t i) { return near[i * results + r]; };
             changes = std::abs(near_of(texel) - stencil(near_of)) >
-                      largest_change * light.tolerance * visible_scale(all[texel * results + r]);
+                      std::max(noise[r], largest_change * light.tolerance * visible_scale(all[texel * results + r]));
         }
         if (changes)
             is_rough[texel] |= rough;
@@ -133,6 +152,14 @@ void BentSolution::mark_changes(std::size_t step, const Light& light, Mask& is_r
 void BentSolution::mark_differences(std::size_t step, const Light& light, const float* luminance, Mask& is_rough) const
 {
     const std::size_t channels = light.brightest.size();
+    std::vector<float> noise;  // [channel] over the largest luminance
+    for (std::size_t c = 0; c < channels; ++c)
+        noise.push_back(
+            light.brightest[c] > 0.0f
+                ? static_cast<float>(light.noise(step / 2) / std::sqrt(light.accuracy.texels[c]) *
+                                     mean_of(std::span(luminance, m_grid.texels() * channels), c, channels)) /
+                      light.brightest[c]
+                : 0.0f);
     m_texels->for_each(step, [&](const NestedTexels::Place& place) {
         const std::size_t texel = place.y * m_grid.width + place.x;
         if (m_is_solved[texel] == 0)
@@ -144,11 +171,25 @@ void BentSolution::mark_differences(std::size_t step, const Light& light, const 
                 continue;
             const auto value_of = [&](std::size_t i) { return luminance[i * channels + c] / light.brightest[c]; };
             const float here = value_of(texel);
-            differs = std::abs(here - stencil(value_of)) > largest_difference * light.tolerance * visible_scale(here);
+            differs = std::abs(here - stencil(value_of)) >
+                      std::max(noise[c], largest_difference * light.tolerance * visible_scale(here));
         }
         if (differs)
             is_rough[texel] |= rough;
     });
+}
+
+// Mean of whole texels with a value, [texel][count].
+double BentSolution::mean_of(std::span<const float> values, std::size_t index, std::size_t count) const
+{
+    double sum = 0.0;
+    std::size_t texels = 0;
+    for (std::size_t i = 0; i < m_grid.texels(); ++i)
+        if (m_texels->is_whole(i) && values[i * count + index] > 0.0f) {
+            sum += static_cast<double>(values[i * count + index]);
+            ++texels;
+        }
+    return sum / static_cast<double>(std::max<std::size_t>(texels, 1));
 }
 
 // Returns the number of wanted samples: those of the first step, or marked ones of another step that are not solved.
@@ -171,7 +212,7 @@ std::size_t BentSolution::find_wanted(std::size_t step, const Mask& is_rough, Ma
 }
 
 // Mean of a texel's pieces.
-float BentSolution::mean_of(std::size_t texel, std::size_t channel, std::size_t channels) const
+float BentSolution::mean_of_pieces(std::size_t texel, std::size_t channel, std::size_t channels) const
 {
     const BentSamples::Range& range = m_samples.of_texel[texel];
     float sum = 0.0f;
@@ -195,8 +236,9 @@ void BentSolution::solve_some(const Mask& is_wanted, SurfaceField& field, Progre
                     m_is_beyond[i] = 1;
             const auto [beside, weight] = m_samples.beside(i);
             for (std::size_t c = 0; c < channels; ++c) {
-                const float own = mean_of(i, c, channels);
-                luminance[i * channels + c] = weight > 0.0f ? own + weight * (mean_of(beside, c, channels) - own) : own;
+                const float own = mean_of_pieces(i, c, channels);
+                luminance[i * channels + c] =
+                    weight > 0.0f ? own + weight * (mean_of_pieces(beside, c, channels) - own) : own;
             }
         }
     });
@@ -217,21 +259,26 @@ void BentSolution::interpolate(std::size_t step, std::size_t channels, float* lu
         });
 }
 
-void BentSolution::solve(SurfaceField& field, double tolerance, Progress& progress, float* luminance)
+void BentSolution::solve_all(SurfaceField& field, Progress& progress, float* luminance)
+{
+    solve_some(Mask(m_samples.all.size(), 1), field, progress, luminance);
+}
+
+void BentSolution::solve(SurfaceField& field, const Accuracy& accuracy, Progress& progress, float* luminance)
 {
     const std::size_t texels = m_grid.texels();
     m_is_solved.assign(texels, 0);
     m_is_beyond.assign(texels, 0);
     field.gather();
-    const Light light{field, static_cast<float>(tolerance), field.brightest()};
+    const Light light{field, accuracy, static_cast<float>(accuracy.tolerance), field.brightest()};
     const std::size_t channels = light.brightest.size();
     m_values.assign(m_samples.all.size() * channels, 0.0f);
     std::fill_n(luminance, texels * channels, 0.0f);
-    Mask is_wanted(m_samples.all.size(), 1);
     if (m_texels == nullptr) {
-        solve_some(is_wanted, field, progress, luminance);
+        solve_all(field, progress, luminance);
         return;
     }
+    Mask is_wanted(m_samples.all.size());
     std::array<Mask, NestedTexels::steps.size()> is_rough;
     std::array<double, NestedTexels::steps.size()> expected{};  // samples
     for (std::size_t s = 0; s < is_rough.size(); ++s) {
@@ -241,6 +288,10 @@ void BentSolution::solve(SurfaceField& field, double tolerance, Progress& progre
             spread_marks(*m_texels, NestedTexels::steps[s], is_rough[s]);
         }
         expected[s] = static_cast<double>(find_wanted(NestedTexels::steps[s], is_rough[s], is_wanted));
+    }
+    if (std::accumulate(expected.begin(), expected.end(), 0.0) >= most_part * static_cast<double>(is_wanted.size())) {
+        solve_all(field, progress, luminance);
+        return;
     }
     double left = 1.0;
     for (std::size_t s = 0; s < is_rough.size(); ++s) {

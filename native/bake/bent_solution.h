@@ -3,6 +3,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <span>
 #include <vector>
 
 #include "bake/bake.h"
@@ -19,6 +20,13 @@ namespace beamspread {
 // doi:10.1137/S1064827597316278). The others are interpolated, which is off by about the field's tolerance at most.
 class BentSolution {
 public:
+    // How exact luminance has to be, and how noisy the light is.
+    struct Accuracy {
+        double tolerance;
+        double noise = 0.0;  // standard deviation of a texel's light by rays, over the mean
+        std::vector<double> texels{};  // [channel] number of texels that the light of one fills, about, and its own
+    };
+
     // `texels`: null solves all. All are viewed.
     BentSolution(const ReceiverGrid& grid, const BentSamples& samples, const NestedTexels* texels);
 
@@ -26,7 +34,7 @@ public:
     double least_part() const;
 
     // Writes [texel][channel]; 0 outside of the mesh. Rays have been added to the field. Throws Cancelled.
-    void solve(SurfaceField& field, double tolerance, Progress& progress, float* luminance);
+    void solve(SurfaceField& field, const Accuracy& accuracy, Progress& progress, float* luminance);
 
     // After `solve`.
     BentShares shares() const;
@@ -35,9 +43,11 @@ private:
     using Mask = std::vector<std::uint8_t>;  // [texel]
     struct Light;
 
+    void solve_all(SurfaceField& field, Progress& progress, float* luminance);
     bool is_first(std::size_t texel) const;
     bool has_samples(std::size_t texel) const { return m_samples.of_texel[texel].count > 0; }
-    float mean_of(std::size_t texel, std::size_t channel, std::size_t channels) const;
+    float mean_of_pieces(std::size_t texel, std::size_t channel, std::size_t channels) const;
+    double mean_of(std::span<const float> values, std::size_t index, std::size_t count) const;
     std::size_t find_wanted(std::size_t step, const Mask& is_rough, Mask& is_wanted) const;
     void mark_changes(std::size_t step, const Light& light, Mask& is_rough) const;
     void mark_differences(std::size_t step, const Light& light, const float* luminance, Mask& is_rough) const;

@@ -110,8 +110,8 @@ def test_even_light_stays_even_where_texels_grow(path, ldf):
 @pytest.mark.parametrize(("path", "mean"), [(0.1, 0.01), (0.5, 0.0075)])
 def test_light_turns_with_a_ball_around_its_pole(path, mean, ldf):
     """A ball by longitude and latitude below a sun on its axis: rows of texels are even, but for their facets. Narrow
-    texels share samples: .8 and .6 % of scatter measured, 3.8 % in the row where they begin to; 1.5 and 1.0 % if each is
-    divided.
+    texels share samples: .8 and .6 % of scatter measured, 3.8 % in the row where they begin to; 1.5 and 1.0 % if each
+    is divided.
     """
     texels, covered = cut_texels(ball(96, 48), 384, 192)
     surface = native.Surface(texels.native(), covered)

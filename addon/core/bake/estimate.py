@@ -53,14 +53,20 @@ MANY_TRIANGLES = 1000
 # Seconds per texel and direction of the solver `adaptive`, and per pair of texels of `direct`; for suns and for others.
 ADAPTIVE, DIRECT = (1e-6, 3e-6), (0.2e-9, 30e-9)
 
-# Seconds of the solution on surfaces that bend: in any case, for the tables of its media; and for each piece of a texel
-# with a mean free path of a texel, and each channel of its own there. They grow with this power of the path.
-BENT, BENT_TEXEL, BENT_CHANNEL, BENT_POWER = 1.6, 4.5e-6, 10.5e-6, 0.55
-# They grow with this power of a surface's turning, relative to a ball's, up to this one.
-TURNING_POWER, MAX_TURNING = 0.75, 5.0
+# Seconds of the solution on surfaces that bend: in any case, for the tables of its media; for each sample, and each channel
+# of its own.
+BENT, BENT_SAMPLE, BENT_CHANNEL = 1.1, 0.6e-6, 2.1e-6
+# The same of a sample with a mean free path of a texel on a ball; they grow with these powers of the path, and of a
+# surface's turning relative to a ball's, up to this one.
+BENT_PATH, PATH_POWER, TURNING_POWER, MAX_TURNING = 0.3e-6, 1.1, 1.5, 5.0
+# Multiple where the noise of light from all around differs from texel to texel.
+BENT_NOISY = 2.0
+# On slabs that bend, whose texels are all solved: for each sample, and each channel of its own there, with a mean free path
+# of a texel; the powers of the path and of the turning.
+SLAB_SAMPLE, SLAB_CHANNEL, SLAB_PATH_POWER, SLAB_TURNING_POWER = 4.5e-6, 10.5e-6, 0.55, 0.75
 # Seconds of a texel beside a crease as long as the root of the area, for each channel and a mean free path of a texel;
 # and the power of the path.
-CREASE, CREASE_PATH = 15e-6, 1.5
+CREASE, CREASE_PATH = 30e-6, 1.5
 # Part of a surface that bends that lamps and suns light, about.
 LIT_BY_LAMPS = 0.5
 
@@ -232,10 +238,16 @@ class Workload:
         is_wide = self.broad_rays + self.narrow_rays > 0
         directions = self.lamps + self.broad_rays + self.narrow_rays + len(STRATA) * self.bounced
         if self.is_bent and settings.solver != "direct":
-            of_piece = (BENT_TEXEL + BENT_CHANNEL * self.channels) * self.path**BENT_POWER
-            of_piece *= min(max(self.bending.turning, 1.0), MAX_TURNING) ** TURNING_POWER
+            turning = min(max(self.bending.turning, 1.0), MAX_TURNING)
+            if math.isfinite(self.thickness):
+                of_sample = (SLAB_SAMPLE + SLAB_CHANNEL * self.channels) * self.path**SLAB_PATH_POWER
+                of_sample *= turning**SLAB_TURNING_POWER
+            else:
+                of_path = BENT_PATH * self.channels * self.path**PATH_POWER * turning**TURNING_POWER
+                of_sample = BENT_SAMPLE + BENT_CHANNEL * self.channels + of_path
+                of_sample *= BENT_NOISY if self.broad_rays else 1.0
             of_creases = CREASE * self.bending.creases * self.channels * self.path**CREASE_PATH * self.texels**0.5
-            return BENT + (of_piece * self.texels * self.pieces + of_creases) * self.lit
+            return BENT + (of_sample * self.texels * self.pieces + of_creases) * self.lit
         if settings.solver != "fft":
             sun, direction = ADAPTIVE if settings.solver == "adaptive" else DIRECT
             pairs = self.texels if settings.solver == "adaptive" else self.texels**2
