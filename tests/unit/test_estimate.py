@@ -241,7 +241,8 @@ def test_bodies_take_as_long_as_measured(texels, pieces, channels, bending, path
     """CPU seconds of whole bakes in Blender 4.5 below a lamp, in a new session: marble's albedos, and paths scaled to
     texels.
     """
-    load = Workload(texels, is_bent=True, lamps=1, pieces=pieces, channels=channels, bending=bending, lit=0.5, path=path)
+    facts = {"pieces": pieces, "channels": channels, "bending": bending, "path": path}
+    load = Workload(texels, is_bent=True, lamps=1, lit=0.5, **facts)
     assert cpu / 1.5 < load.seconds(replace(SETTINGS, threads=1)) < cpu * 1.5
 
 

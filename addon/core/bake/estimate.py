@@ -53,16 +53,16 @@ MANY_TRIANGLES = 1000
 # Seconds per texel and direction of the solver `adaptive`, and per pair of texels of `direct`; for suns and for others.
 ADAPTIVE, DIRECT = (1e-6, 3e-6), (0.2e-9, 30e-9)
 
-# Seconds of the solution on surfaces that bend: in any case, for the tables of its media; for each sample, and each channel
-# of its own.
+# Seconds of the solution on surfaces that bend: in any case, for the tables of its media; for each sample, and each
+# channel of its own.
 BENT, BENT_SAMPLE, BENT_CHANNEL = 1.1, 0.6e-6, 2.1e-6
 # The same of a sample with a mean free path of a texel on a ball; they grow with these powers of the path, and of a
 # surface's turning relative to a ball's, up to this one.
 BENT_PATH, PATH_POWER, TURNING_POWER, MAX_TURNING = 0.3e-6, 1.1, 1.5, 5.0
 # Multiple where the noise of light from all around differs from texel to texel.
 BENT_NOISY = 2.0
-# On slabs that bend, whose texels are all solved: for each sample, and each channel of its own there, with a mean free path
-# of a texel; the powers of the path and of the turning.
+# On slabs that bend, whose texels are all solved: for each sample, and each channel of its own there, with a mean free
+# path of a texel; the powers of the path and of the turning.
 SLAB_SAMPLE, SLAB_CHANNEL, SLAB_PATH_POWER, SLAB_TURNING_POWER = 4.5e-6, 10.5e-6, 0.55, 0.75
 # Seconds of a texel beside a crease as long as the root of the area, for each channel and a mean free path of a texel;
 # and the power of the path.
