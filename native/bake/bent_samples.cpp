@@ -41,6 +41,13 @@ void find_axes(Vec3& across, Vec3& along)
     along = longer;
 }
 
+// True inside the mesh for a texel that the mesh covers wholly.
+bool is_whole(const Surface& surface, std::size_t texel)
+{
+    return surface.grid.bent_texel(texel).area > 0.0f &&
+           (!surface.coverage || surface.coverage[texel] >= least_whole_coverage);
+}
+
 // Change of the normal along an axis of the texture, per texel: half of that from the texel before to the one after, or that
 // to one of them, where they are neighbors.
 Vec3 turn_along(const ReceiverGrid& grid, std::size_t texel, std::size_t place, std::size_t count, std::size_t stride,
@@ -98,9 +105,6 @@ BentSamples::BentSamples(const Surface& surface, double mean_free_path)
 void BentSamples::find_runs(const Surface& surface)
 {
     const ReceiverGrid& grid = surface.grid;
-    const auto is_whole = [&](std::size_t i) {
-        return grid.bent_texel(i).area > 0.0f && (!surface.coverage || surface.coverage[i] >= least_whole_coverage);
-    };
     const auto width_of = [&](std::size_t i) { return static_cast<double>(glm::length(grid.bent_texel(i).step_x)); };
     // Number of texels that share samples, by their size.
     const auto most_of = [&](std::size_t i) {
@@ -114,11 +118,11 @@ void BentSamples::find_runs(const Surface& surface)
                glm::dot(a.normal, b.normal) >= least_normal_cosine;
     };
     for (std::size_t i = 0; i < grid.texels(); ++i) {
-        if (!is_whole(i) || most_of(i) < 2)
+        if (!is_whole(surface, i) || most_of(i) < 2)
             continue;
         const std::size_t row_end = (i / grid.width + 1) * grid.width;
         const auto goes_on_at = [&](std::size_t next) {
-            return next < row_end && is_whole(next) && most_of(next) >= 2 &&
+            return next < row_end && is_whole(surface, next) && most_of(next) >= 2 &&
                    are_neighbors(grid.bent_texel(next - 1), grid.bent_texel(next), &BentTexel::step_x);
         };
         std::size_t end = i + 1;
@@ -127,7 +131,7 @@ void BentSamples::find_runs(const Surface& surface)
             most = std::min(most, most_of(end));
             ++end;
         }
-        // As many runs as fit, about alike.
+        // Runs of about the same number of texels: a short one at the end would have a disk unlike its neighbors.
         std::size_t parts = (end - i + most - 1) / most;
         const auto begin_of = [&](std::size_t part) { return i + part * (end - i) / parts; };
         const auto turns = [&] {
@@ -199,7 +203,7 @@ void BentSamples::add(const ReceiverGrid& grid, std::size_t texel, const Part& p
     }
 }
 
-// Those of a texel are in the four texels beside; those of a piece are the pieces of the same number.
+// The neighbors of a piece are the pieces of the same number in the four texels beside its own.
 void BentSamples::find_neighbors(const ReceiverGrid& grid)
 {
     neighbors.resize(all.size());
@@ -241,10 +245,10 @@ std::pair<std::size_t, float> BentSamples::beside(std::size_t texel) const
 
 std::vector<std::uint8_t> BentSamples::whole_texels(const Surface& surface) const
 {
-    std::vector<std::uint8_t> is_whole(surface.samples());
-    for (std::size_t i = 0; i < is_whole.size(); ++i)
-        is_whole[i] = of_texel[i].count > 0 && (!surface.coverage || surface.coverage[i] >= least_whole_coverage);
-    return is_whole;
+    std::vector<std::uint8_t> are_whole(surface.samples());
+    for (std::size_t i = 0; i < are_whole.size(); ++i)
+        are_whole[i] = is_whole(surface, i) ? 1 : 0;
+    return are_whole;
 }
 
 }  // namespace beamspread

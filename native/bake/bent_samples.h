@@ -44,7 +44,7 @@ struct BentSamples {
     // linear in between.
     std::pair<std::size_t, float> beside(std::size_t texel) const;
 
-    // As in `SurfaceProblem`.
+    // Parts of a `SurfaceProblem`, in its order.
     std::vector<SurfaceSample> all;
     std::vector<SampleSteps> steps;
     std::vector<SampleNeighbors> neighbors;

@@ -38,8 +38,8 @@ constexpr std::uint8_t rough = 2;    // differs from its interpolation
 constexpr std::uint8_t in_row = 4;   // near such a one in the row
 constexpr std::uint8_t around = 8;   // near such a one
 
-// What differences are relative to, over the largest luminance, at some luminance: in the dark smaller ones are seen, about
-// as its root.
+// Scale of visible differences at a luminance, both over the largest luminance. The eye sees smaller differences in the
+// dark, about in proportion to the root of the luminance.
 float visible_scale(float luminance)
 {
     return std::sqrt(std::abs(luminance) + black);
@@ -68,7 +68,7 @@ void spread_marks(const NestedTexels& texels, std::size_t step, std::vector<std:
 
 }  // namespace
 
-// What decides about texels.
+// Light of the field, and how exact its luminance has to be.
 struct BentSolution::Light {
     const SurfaceField& field;
     Accuracy accuracy;
