@@ -34,8 +34,8 @@ function(ducc_instruction_set name)
 endfunction()
 
 if(linux AND x86_64)
-  # Code counts where there is a faster variant, since a package has all of them for each Python. With -O2 the AVX-512
-  # variant is a third smaller, and transforms take 1.1 times as long.
+  # Code is small where there is a faster variant. With -O2 the AVX-512 variant is a third smaller, and transforms take
+  # 1.1 times as long.
   ducc_instruction_set(baseline -Os)
   ducc_instruction_set(avx2 -march=x86-64-v3 -O2)
   ducc_instruction_set(avx512 -march=x86-64-v4)

@@ -26,6 +26,12 @@ def empty(package):
     return "file too short"
 
 
+def of_all_pythons_and_empty(package):
+    module_of(package).unlink()
+    (package / f"_native{EXTENSION_SUFFIXES[-1]}").write_bytes(b"")
+    return "file too short"
+
+
 def for_a_newer_glibc(package):
     """A module that asks for a version of glibc that no system has."""
     data = module_of(package).read_bytes()
@@ -35,4 +41,4 @@ def for_a_newer_glibc(package):
     return f"GLIBC_{newer.decode()}' not found"
 
 
-ALL = [remove, of_another_python, empty, for_a_newer_glibc]
+ALL = [remove, of_another_python, empty, of_all_pythons_and_empty, for_a_newer_glibc]

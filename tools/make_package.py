@@ -2,10 +2,10 @@
 
     tools/make_package.py STAGED_PACKAGE MODULES LICENCES OUTPUT_FOLDER
 
-takes the modules for further Pythons and the licences of the libraries in them from their folders, and
+takes modules and the licences of the libraries in them from their folders, and
 makes OUTPUT_FOLDER/beamspread-VERSION-PLATFORM.zip with one folder, `beamspread`: Blender 3.4 can't install files at
 the archive's root. Pages of docs/ go in as HTML (tools/make_help.py). The same files give the same bytes. CMake's
-target `package` calls this.
+target `package` calls this. A module of MODULES that is for all Pythons replaces the staged one, which is for one.
 """
 
 import platform
@@ -25,7 +25,8 @@ MOST_BYTES = 40_000_000
 # Type stubs are for editors: the wheel has them.
 LEFT_OUT = re.compile(r"(^|/)__pycache__/|\.pyc$|\.pyi$|^py\.typed$|/\.|^\.|^CMakeFiles/|^docs/")
 SUFFIXES = {".py", ".exr", ".csv", ".toml", ".so", ".pyd"}
-MODULE = re.compile(r"^_native\.(?P<abi>cpython-3\d+|cp3\d+|abi3)[^/]*\.(so|pyd)$")
+MODULE = re.compile(r"^_native(\.(cpython-3\d+|cp3\d+|abi3)[^/.]*)?\.(so|pyd)$")
+FOR_ALL_PYTHONS = {"_native.so", "_native.pyd"}
 
 
 def platform_here() -> str:
@@ -50,12 +51,14 @@ def licences(folder: Path) -> dict[str, bytes]:
     return {"LICENSE": (ROOT / "LICENSE").read_bytes()} | {f"LICENSES/{name}": text for name, text in texts.items()}
 
 
-def content(staged: Path, further_modules: Path, licences_folder: Path) -> dict[str, bytes]:
+def content(staged: Path, modules: Path, licences_folder: Path) -> dict[str, bytes]:
     """Name in the package -> bytes."""
-    files = {path.name: path.read_bytes() for path in further_modules.glob("_native.*")}
+    names = {path.name for path in modules.glob("_native.*")}
+    for_all = names & FOR_ALL_PYTHONS
+    files = {name: (modules / name).read_bytes() for name in for_all or names}
     for path in sorted(staged.rglob("*")):
         name = path.relative_to(staged).as_posix()
-        if path.is_dir() or LEFT_OUT.search(name):
+        if path.is_dir() or LEFT_OUT.search(name) or (for_all and MODULE.match(name)):
             continue
         if path.suffix not in SUFFIXES and name != "VERSION":
             sys.exit(f"{path}: no such file belongs into a package; tools/make_package.py lists what does")
@@ -86,18 +89,18 @@ def write(path: Path, files: dict[str, bytes]) -> None:
     partial.replace(path)
 
 
-def main(staged: Path, further_modules: Path, licences_folder: Path, output: Path) -> Path:
+def main(staged: Path, modules: Path, licences_folder: Path, output: Path) -> Path:
     said = versions(staged)
     if len(set(said.values())) > 1:
         sys.exit(f"versions differ: {said}; tools/version.py writes them anew")
-    files = content(staged, further_modules, licences_folder)
+    files = content(staged, modules, licences_folder)
     files["blender_manifest.toml"] = of_platform(files["blender_manifest.toml"], platform_here())
     path = output / f"beamspread-{said['VERSION']}-{platform_here()}.zip"
     for old in output.glob("beamspread-*.zip"):
         old.unlink()
     write(path, files)
-    modules = [MODULE.match(name)["abi"] for name in sorted(files) if MODULE.match(name)]
-    print(f"{path}: {path.stat().st_size / 1e6:.1f} MB, {len(files)} files, modules {', '.join(modules)}")
+    packed = [name for name in sorted(files) if MODULE.match(name)]
+    print(f"{path}: {path.stat().st_size / 1e6:.1f} MB, {len(files)} files, {', '.join(packed)}")
     return path
 
 

@@ -9,8 +9,8 @@ from importlib.machinery import EXTENSION_SUFFIXES
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-WANTED = f"_native{EXTENSION_SUFFIXES[0]}"
-"""Name of the file that this Python looks for first."""
+WANTED = [f"_native{suffix}" for suffix in (EXTENSION_SUFFIXES[0], EXTENSION_SUFFIXES[-1])]
+"""Names of the files that this Python loads: its own module, or one for several Pythons."""
 
 
 class AnotherVersionError(ImportError):
@@ -35,10 +35,10 @@ def _problem_of(folder: Path, error: Exception) -> str:
     if isinstance(error, AnotherVersionError):
         return str(error)
     modules = sorted(path.name for path in folder.glob("_native.*") if path.suffix in {".so", ".pyd"})
-    cause = str(error).strip().rstrip(".") if WANTED in modules else "the file for it is missing"
+    cause = str(error).strip().rstrip(".") if set(WANTED) & set(modules) else "the file for it is missing"
     return (
         f"beamspread has no working native module for Python {sys.version_info.major}.{sys.version_info.minor} in "
-        f"{folder}: {cause}. Needed: {WANTED} for {platform.system()} {platform.machine()}. "
+        f"{folder}: {cause}. Needed: {' or '.join(WANTED)} for {platform.system()} {platform.machine()}. "
         f"Found there: {', '.join(modules) or 'none'}. Install the zip of Beamspread {_version(folder)} for this "
         "Python and system, and restart Blender. Until then nothing can be baked; nodes, settings and baked images "
         "stay as they are."

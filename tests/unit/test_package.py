@@ -6,6 +6,7 @@ import subprocess
 import sys
 import zipfile
 from html.parser import HTMLParser
+from importlib.machinery import EXTENSION_SUFFIXES
 from pathlib import Path
 
 import beamspread
@@ -13,17 +14,17 @@ import pytest
 
 ROOT = Path(__file__).resolve().parents[2]
 STAGED = Path(beamspread.__file__).resolve().parent
-OTHER_MODULE = "_native.cpython-313-x86_64-linux-gnu.so"
-
+MODULE_OF_ALL = "_native.so"
+MODULE_OF_ANOTHER = "_native.cpython-313-x86_64-linux-gnu.so"
 
 LIBRARIES = {"ducc", "eigen", "embree", "glm", "highway", "imath", "openexr", "pybind11", "tbb", "zlib"}
 
 
-def packed(folder, staged=STAGED):
-    """The module of another Python is made up: its content isn't read."""
+def packed(folder, staged=STAGED, module=MODULE_OF_ALL):
+    """The further module is made up: its content isn't read."""
     modules = folder / "more"
     modules.mkdir(exist_ok=True)
-    (modules / OTHER_MODULE).write_bytes(b"another Python's")
+    (modules / module).write_bytes(b"further")
     licences = max(ROOT.glob("build/deps/*/licenses"), key=lambda path: path.stat().st_mtime)
     return subprocess.run(
         [sys.executable, "-B", ROOT / "tools" / "make_package.py", staged, modules, licences, folder],
@@ -66,16 +67,24 @@ def test_it_holds_the_staged_files_and_licences_and_nothing_else(files):
     names = {name.removeprefix("beamspread/") for name in files}
     staged = {path.relative_to(STAGED).as_posix() for path in STAGED.rglob("*") if path.is_file()}
     staged = {name for name in staged if "__pycache__" not in name and not name.endswith((".pyi", "py.typed"))}
-    staged = {name for name in staged if not name.startswith("docs/")}
+    staged = {name for name in staged if not name.startswith(("docs/", "_native."))}
     pages = {name for name in names if name.startswith("docs/")}
     licences = {name for name in names if name.startswith("LICENSES/")}
-    assert names == staged | licences | pages | {"LICENSE", OTHER_MODULE}
+    assert names == staged | licences | pages | {"LICENSE", MODULE_OF_ALL}
     assert {Path(name).suffix for name in pages} == {".html", ".webp"}
     assert licences == {f"LICENSES/{name}.txt" for name in LIBRARIES}
     for name in ("__init__.py", "blender_manifest.toml", "batch.py", "data/materials.csv", "VERSION"):
         assert f"beamspread/{name}" in files
     assert sum(name.startswith("library/") for name in names) == 24  # planes and curved surfaces
     assert all(files[f"beamspread/{name}"] == (STAGED / name).read_bytes() for name in staged)
+
+
+def test_without_a_module_for_all_pythons_it_holds_one_for_each(tmp_path):
+    assert packed(tmp_path, module=MODULE_OF_ANOTHER).returncode == 0
+    (path,) = tmp_path.glob("*.zip")
+    with zipfile.ZipFile(path) as archive:
+        modules = {Path(name).name for name in archive.namelist() if "/_native." in name}
+    assert modules == {f"_native{EXTENSION_SUFFIXES[0]}", MODULE_OF_ANOTHER}
 
 
 def test_help_buttons_find_their_pages(files):
