@@ -113,6 +113,8 @@ public:
           m_width(map.width * map.cells_x),
           m_height(map.height * map.cells_y),
           m_faces_all(!normal),
+          m_is_even(
+              std::ranges::all_of(map.radiance, [&](const Vec3f& value) { return value == map.radiance.front(); })),
           m_normal(glm::transpose(map.to_world) * normal.value_or(Vec3(0.0))),
           m_columns(m_width, pi, -pi),
           m_rows(m_height, -0.5 * pi, 0.5 * pi),
@@ -130,7 +132,7 @@ public:
         for (std::size_t y = 0; y < m_height; ++y)
             m_in_row.emplace_back(std::span(m_cumulated).subspan(y * (m_width + 1), m_width + 1));
         m_of_rows = Distribution(m_cumulated_rows);
-        if (m_faces_all) {
+        if (m_faces_all && !m_is_even) {
             std::vector<SkyPart> parts(sky_columns * sky_rows);
             parallel_for(sky_rows, [&](std::size_t y) {
                 for (std::size_t x = 0; x < sky_columns; ++x)
@@ -155,7 +157,9 @@ public:
 
     Vec3 irradiance(const Vec3& /*point*/, const Vec3& normal) const override
     {
-        return m_faces_all ? m_sky.at(glm::transpose(m_map.to_world) * normal) : m_irradiance;
+        if (!m_faces_all)
+            return m_irradiance;
+        return m_is_even ? pi * Vec3(m_map.radiance.front()) : m_sky.at(glm::transpose(m_map.to_world) * normal);
     }
 
     Seen seen(const Vec3& direction) const override
@@ -311,6 +315,7 @@ private:
     const EnvironmentMap& m_map;
     std::size_t m_width, m_height;  // cells
     bool m_faces_all;
+    bool m_is_even;  // true if the map has one radiance
     Vec3 m_normal;                  // in the image's space
     Lines m_columns, m_rows;
     std::vector<double> m_cumulated;  // along each row, one more than cells
@@ -319,7 +324,7 @@ private:
     Distribution m_of_rows;
     double m_sagitta;
     Vec3 m_irradiance{0.0};  // on the plane
-    SkyIrradiance m_sky;     // for any normal
+    SkyIrradiance m_sky;     // for any normal; unused where the map is even
 };
 
 }  // namespace

@@ -35,8 +35,11 @@ std::array<double, 4> spline_weights(double t)
 OpenIrradiance::OpenIrradiance(const ReceiverGrid& grid, const Light& light, bool at_centers)
     : m_grid(grid), m_light(light), m_pitch(std::max(grid.pitch_x, grid.pitch_y)), m_at_centers(at_centers)
 {
-    if (grid.is_bent())
+    if (grid.is_bent()) {
+        m_nodes.resize(grid.texels());
+        parallel_for(grid.texels(), [&](std::size_t i) { m_nodes[i] = in_bent_texel(i); });
         return;
+    }
     if (std::isinf(light.distance_from(grid.origin))) {
         m_everywhere = light.irradiance(grid.origin, grid.normal);
         return;
@@ -54,7 +57,7 @@ OpenIrradiance::OpenIrradiance(const ReceiverGrid& grid, const Light& light, boo
 Vec3 OpenIrradiance::at(std::size_t x, std::size_t y) const
 {
     if (m_grid.is_bent())
-        return in_bent_texel(x, y);
+        return m_nodes[y * m_grid.width + x];
     if (m_nodes.empty())
         return m_everywhere;
     const Vec3 point = m_grid.point(static_cast<double>(x), static_cast<double>(y));
@@ -63,11 +66,12 @@ Vec3 OpenIrradiance::at(std::size_t x, std::size_t y) const
     return in_texel(static_cast<double>(x), static_cast<double>(y));
 }
 
-Vec3 OpenIrradiance::in_bent_texel(std::size_t x, std::size_t y) const
+Vec3 OpenIrradiance::in_bent_texel(std::size_t texel) const
 {
-    const std::size_t texel = y * m_grid.width + x;
     if (!m_grid.bent_texel(texel).is_inside())
         return Vec3(0.0);
+    const std::size_t x = texel % m_grid.width;
+    const std::size_t y = texel / m_grid.width;
     return in_texel(static_cast<double>(x), static_cast<double>(y), m_grid.normal_at(texel), m_grid.pitch_at(texel));
 }
 

@@ -19,7 +19,7 @@ public:
     Vec3 at(std::size_t x, std::size_t y) const;
 
 private:
-    Vec3 in_bent_texel(std::size_t x, std::size_t y) const;
+    Vec3 in_bent_texel(std::size_t texel) const;
     Vec3 in_texel(double x, double y) const;
     Vec3 in_texel(double x, double y, const Vec3& normal, double pitch) const;
     Vec3 between_nodes(std::size_t x, std::size_t y) const;
@@ -30,8 +30,9 @@ private:
     bool m_at_centers;
     Vec3 m_everywhere{0.0};  // irradiance by a light infinitely far away
     std::size_t m_columns = 0;
-    std::vector<Vec3>
-        m_nodes;  // irradiance of every `texels_per_node`-th texel, from one before the first; may be empty
+    // Irradiance of every `texels_per_node`-th texel, from one before the first; of every texel where they bend. May be
+    // empty.
+    std::vector<Vec3> m_nodes;
 };
 
 }  // namespace beamspread
