@@ -72,6 +72,17 @@ def test_a_change_waits_for_its_picture_unless_that_was_in_vain(monkeypatch):
         np.testing.assert_array_equal(moved(0.2), picture)
 
 
+def test_live_says_that_no_view_shows_it(monkeypatch):
+    _, _, material = make_scene()
+    live_pixels(material)
+    assert live_lines() == []
+    with monkeypatch.context() as patched:
+        patched.setattr(timer, "is_looked_at", lambda _: False)  # as by Solid views alone
+        assert live_lines() == ["Live waits for a 3D View in Material Preview or Rendered."]
+        switch_off()
+        assert live_lines() == []
+
+
 def test_a_moved_lamp_reads_no_mesh(monkeypatch):
     _, lamp, material = make_scene()
     first = live_pixels(material)

@@ -39,3 +39,13 @@ def test_the_obstacle_of_live_is_shown_once(monkeypatch):
     bake_panel.draw_bake(layout, context())
     assert layout.said.count(why) == 1
     assert "light of 'Lamp'" in layout.said
+
+
+def test_what_live_and_a_bake_say_is_shown_once(monkeypatch):
+    """A bake keeps the words alone."""
+    layout, what, remedy = Layout(), "3 loose parts of 'First' are near to others.", "Separate them."
+    target = Target("First", "One")
+    state.rows = {target: Row(target, Status.BAKED, (note("", f"{what} {remedy}"),))}
+    monkeypatch.setattr(timer, "messages", lambda: [note(str(target), what, remedy)])
+    bake_panel.draw_bake(layout, context())
+    assert layout.said.count(what) == 1

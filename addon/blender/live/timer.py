@@ -41,9 +41,14 @@ live = _Live()
 
 def messages() -> Messages:
     """Messages of Live for panels."""
+    found = Messages()
+    if bpy.context.scene.beamspread.use_live and not is_looked_at(bpy.context):
+        found.add(note("", "Live waits for a 3D View in Material Preview or Rendered."))
     if live.session is not None:
-        return live.session.messages()
-    return Messages([note("", f"Live was switched off: {live.failure}")] if live.failure else [])
+        found.add(*live.session.messages())
+    elif live.failure:
+        found.add(note("", f"Live was switched off: {live.failure}"))
+    return found
 
 
 def step(context) -> float:

@@ -6,7 +6,7 @@ from collections import Counter
 from collections.abc import Iterable
 
 from ...core import native
-from ...core.messages import Messages
+from ...core.messages import Level, Message, Messages
 from ...core.time_left import duration
 from .. import compat
 from ..jobs.announced import line_of, seconds_of_frames, simulation_line, spread_lines
@@ -160,10 +160,16 @@ def draw_results(layout, context, material_name: str, shown: Messages) -> None:
         status = _status(row)
         name = row.target.object_name if times[row.target.object_name] == 1 else str(row.target)
         draw_lines(box, context, [f"{name}: {status.value}"], ICONS[status])
-        draw_lines(box, context, [str(message) for message in row.messages if message not in shown], "DOT")
+        draw_lines(box, context, [str(item) for item in row.messages if not _is_among(item, shown)], "DOT")
         shown.add(*row.messages)
     if len(rows) > MAX_OBJECTS:
         box.label(text=f"And {len(rows) - MAX_OBJECTS} more", icon="BLANK1")
+
+
+def _is_among(message: Message, shown: Messages) -> bool:
+    """True if a message is shown, or one of the same words: a bake keeps no subject of what it said."""
+    words = {str(item) for item in shown.of(Level.WARNING, Level.INFO)}
+    return message in shown or (not message.subject and str(message) in words)
 
 
 def _status(row: Row) -> Status:
