@@ -32,7 +32,7 @@ def refused(error, work, *arguments, **keywords):
 
 
 def libraries(folder):
-    slab = simulate(Medium(g=0.5, ior=1.4, thickness=3.0), angles=[0, 30, 60], photons=2000, seed=2, threads=THREADS)
+    slab = simulate(Medium(g=0.5, ior=1.4, thickness=3.0), angles=[0, 30, 60, 85], photons=2000, seed=2, threads=THREADS)
     half_space = simulate(Medium(), angles=[0, 45], photons=500, threads=THREADS, progress=lambda fraction: True)
     for library in (slab, half_space):
         path = str(Path(folder) / "library.exr")
@@ -118,7 +118,7 @@ def rays(library):
         native.EnvironmentLight(image, np.eye(3)),
         native.MeshLight(corners + (0, 0, 0.5), faces, np.ones((2, 3), np.float32)),
     ]
-    steep = [(light, (1, 0.5, 1), occluders) for light in lights[:3]]  # within the angles of the library
+    steep = [(light, (1, 0.5, 1), occluders) for light in lights[:3]]
     ones = np.ones((SIZE, SIZE, 3), np.float32)
     surface = native.Surface(grid, ones[..., 0].copy(), 0.0, ones, ones)
     medium = ([library] * 3, (0.9, 0.5, 0.1), (0.1, 0.1, 0.1))

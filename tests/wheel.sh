@@ -39,7 +39,11 @@ case "$wheel" in *manylinux_2_3[0-5]_* | *manylinux_2_2[0-9]_*) ;; *) echo "$whe
 for numpy in "==1.26.4" ">=2"; do
     "$python" -m venv "$out/numpy$numpy"
     "$out/numpy$numpy/bin/pip" install --quiet "numpy$numpy" "$wheel"
-    (cd "$out/numpy$numpy" && env -u PYTHONPATH bin/python ../../../tests/smoke.py && bin/python -m beamspread presets | sed -n 1,2p
+    # A line each: a command that fails within && would not end the script.
+    (cd "$out/numpy$numpy"
+        unset PYTHONPATH
+        bin/python ../../../tests/smoke.py
+        bin/python -m beamspread presets | sed -n 1,2p
         bin/python -c "import beamspread, pathlib, numpy; p = pathlib.Path(beamspread.__file__).parent
 assert (p / '_native.pyi').exists() and (p / 'py.typed').exists() and any((p / 'library').iterdir()), p
 assert not list(p.parent.rglob('_native_test*'))
