@@ -287,6 +287,7 @@ def test_escape_while_the_world_renders_leaves_nothing(tmp_path, monkeypatch):
 
 def test_a_bake_removes_its_copy_of_the_scene_when_it_ends():
     """Not when Python collects its garbage, which may be much later: the copy is as large as the scene."""
+    bpy.context.scene.beamspread.resolution = 16
     plane = add_scene()
     node = scenes.node_of(plane.data.materials[0])
     noise = node.id_data.nodes.new("ShaderNodeTexNoise")  # which Cycles evaluates

@@ -49,8 +49,9 @@ def test_a_wall_returns_light_as_in_cycles():
     assert truth[..., 0].sum() > 2 * truth[..., 2].sum()  # orange
 
 
-def test_materials_that_the_scene_does_not_use_are_no_obstacle():
+def test_materials_that_the_scene_does_not_use_are_no_obstacle(monkeypatch):
     """Materials of a deleted object, or of another scene, which Cycles' copy lacks."""
+    monkeypatch.setattr(cycles_light, "NOISE", 0.05)  # the same in both bakes
     floor = add_scene()
     expected = irradiance(floor, True)
     scenes.add_material("Unused").use_fake_user = True
@@ -58,11 +59,12 @@ def test_materials_that_the_scene_does_not_use_are_no_obstacle():
 
 
 @pytest.mark.parametrize("in_group", [False, True])
-def test_a_textured_floor_returns_its_colors(in_group):
+def test_a_textured_floor_returns_its_colors(in_group, monkeypatch):
     """Red on one side, blue on the other, the node's own colour black: against a diffuse floor of the same nodes.
 
     All of each colour within 2 %; means of 4 x 4 texels within 2.5 % of the brightest, at the median of those lit.
     """
+    monkeypatch.setattr(cycles_light, "NOISE", 0.002)  # of a node: means of 16 have .05 % of all light
     floor = add_scene(scenes.add_group_material() if in_group else None)
     node = find_node(floor.data.materials[0])
     node.color_mode, node.base_color = "BASE_COLOR", (0, 0, 0)
@@ -78,10 +80,11 @@ def test_a_textured_floor_returns_its_colors(in_group):
     assert np.median((np.abs(ours - truth) / truth.max())[lit]) < 0.025
 
 
-def test_bounced_light_spreads_as_any_other():
+def test_bounced_light_spreads_as_any_other(monkeypatch):
     """The base colour is the reflectance under even light. Light of a leaning wall is uneven, and some leaves at the
     border: its reflectance agrees within 10 %.
     """
+    monkeypatch.setattr(cycles_light, "NOISE", 0.005)  # of a node: sums of 1024 have less than .1 %
     floor = add_scene()
     scenes.node_of(floor.data.materials[0]).mean_free_path = (0.005,) * 3
     arriving, leaving = (
@@ -167,6 +170,7 @@ def test_nothing_above_a_receiver_means_no_search():
 def test_a_baked_wall_does_not_shine(monkeypatch, by_cycles, kind):
     """Plain nodes show its image, which is very bright: the floor gets the light of a wall without a bake, within the
     noise of 1 % that bakes allow."""
+    monkeypatch.setattr(cycles_light, "NOISE", 0.005)  # of a node: the mean of 1024 has less than .1 %
     material = scenes.add_material("Wall", color_mode="BASE_COLOR", base_color=(0.9, 0.6, 0.3), linked=True)
     floor = add_scene()
     bpy.data.objects["Wall"].data.materials[0] = material

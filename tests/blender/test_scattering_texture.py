@@ -1,10 +1,13 @@
 """Textures at Base Color in which light scatters: each texel has an albedo of its own."""
 
+from dataclasses import replace
+
 import bpy
 import numpy as np
 import pytest
 from beamspread import Medium, albedo_from_color, library, luminance
 from beamspread.blender.jobs.state import state
+from beamspread.core.bake.spreading import Effort
 from beamspread.core.ldf.reflectance_table import reflectance_table
 from beamspread.core.material import Material
 from beamspread.core.native import native
@@ -48,17 +51,12 @@ def expected(albedo, thickness=np.inf):
     turned = np.radians(ANGLE)
     medium = Material(albedo=(0.5,) * 3, mean_free_path=(PATH,) * 3, anisotropy=G, ior=IOR)
     light = np.full(albedo.shape[:2], np.cos(turned), np.float32)
-    way = np.sin(turned), 0.0, -np.cos(turned)
-    return [luminance(light, (sign * way[0], 0.0, way[2]), medium, PATH, thickness, albedo=albedo) for sign in (1, -1)]
+    return luminance(light, (np.sin(turned), 0.0, -np.cos(turned)), medium, PATH, thickness, albedo=albedo)
 
 
 def distance(ours, truth):
     """Mean difference over the mean."""
     return float(np.abs(ours - truth).mean() / truth.mean())
-
-
-def nearest(ours, truths):
-    return min(distance(ours, truth) for truth in truths)
 
 
 # Noise of up to 2 and 1 %, root mean square: the mean distance is below that of both together.
@@ -70,12 +68,12 @@ def test_a_new_node_scatters_light_by_the_albedo_of_each_texel(plane):
     material = plane.data.materials[0]
     add_texture(material, stripes(*COLORS))
     albedo = stripes(*(albedo_from_color(color, Medium(G, IOR)) for color in COLORS))
-    truths = expected(albedo)
+    truth = expected(albedo)
     assert node_of(material).texture_method == "SCATTERED"
-    assert nearest(bake(plane)[0], truths) < SAME
+    assert distance(bake(plane)[0], truth) < SAME
     assert state.lines() == []
     node_of(material).texture_method = "MULTIPLIED"
-    assert nearest(bake(plane)[0], truths) > 3 * SAME
+    assert distance(bake(plane)[0], truth) > 3 * SAME
 
 
 def test_with_albedos_the_texture_is_the_albedo_itself(plane):
@@ -83,10 +81,11 @@ def test_with_albedos_the_texture_is_the_albedo_itself(plane):
     albedo = stripes((0.8, 0.9, 0.85), (0.95, 0.99, 0.97))
     add_texture(material, albedo)
     node_of(material).color_mode = "ALBEDO"
-    assert nearest(bake(plane)[0], expected(albedo)) < SAME
+    assert distance(bake(plane)[0], expected(albedo)) < SAME
 
 
-def test_albedos_of_one_are_cut_and_said(plane):
+def test_albedos_of_one_are_cut_and_said(plane, monkeypatch):
+    monkeypatch.setattr(Effort, "of_plane", lambda effort, texels: replace(effort, max_walks=64))  # they are very long
     material = plane.data.materials[0]
     add_texture(material, stripes((0.5,) * 3, (1.0,) * 3))
     node_of(material).color_mode = "ALBEDO"
@@ -164,12 +163,10 @@ def test_light_scatters_in_textures_of_meshes_that_bend():
     albedo = reflectance_table(library(Medium(G, IOR))).albedo(stripes(*COLORS))
     medium = Material(albedo=(0.5,) * 3, mean_free_path=(PATH,) * 3, anisotropy=G, ior=IOR)
     turn = ((np.arange(SIZE) + 0.5) / SIZE - 0.5) * SIDE / 3.0
-    truths = []
-    for sign in (1, -1):
-        angle = np.radians(sign * ANGLE) + turn
-        way = np.stack([np.sin(angle), 0 * angle, -np.cos(angle)], -1) * np.ones((SIZE, 1, 1))
-        truths.append(luminance(-way[..., 2], way, medium, PATH, albedo=albedo))
-    assert nearest(found, truths) < 0.05
+    angle = turn + np.radians(ANGLE)
+    way = np.stack([np.sin(angle), 0 * angle, -np.cos(angle)], -1) * np.ones((SIZE, 1, 1))
+    truth = luminance(-way[..., 2], way, medium, PATH, albedo=albedo)
+    assert distance(found, truth) < 0.05
     assert not any("multiplies light" in line or "baked as flat" in line for line in state.lines())
 
 

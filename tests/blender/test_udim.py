@@ -139,15 +139,15 @@ def test_a_new_image_has_the_tiles_that_are_used_and_a_render_shows_them(tmp_pat
 
 
 def test_tiles_of_a_new_image_have_sizes_by_their_planes(tmp_path):
-    """512 texels per meter: 4 m fill a tile, .8 m the others; marble needs no more."""
+    """512 texels per meter: 2 m fill a tile, .8 m the others; marble needs no more."""
     bpy.context.scene.beamspread.use_udim = True
     material = scenes.add_material(linked=True)
     scenes.node_of(material).preset = "marble"
-    quads = add_quads([((-2, -2), 4), ((3, 0), 0.8)], [((0, 0), 1), ((1, 0), 1)], material)
+    quads = add_quads([((-1, -1), 2), ((3, 0), 0.8)], [((0, 0), 1), ((1, 0), 1)], material)
     scenes.select(quads)
     assert bpy.ops.beamspread.bake() == {"FINISHED"}
     assert {tile.number: tuple(tile.size) for tile in scenes.image_of(quads).tiles} == {
-        1001: (2048, 2048),
+        1001: (1024, 1024),
         1002: (512, 512),
     }
 
