@@ -7,7 +7,7 @@ from scenario_player import results_of
 @pytest.fixture(scope="module")
 def seen(tmp_path_factory):
     """Results of window_animation.py."""
-    return results_of("window_animation", tmp_path_factory.mktemp("window"))
+    return results_of("window_animation", tmp_path_factory.mktemp("window"), size=(800, 600))
 
 
 def test_escape_keeps_the_frames_that_are_done_and_shows_them(seen):

@@ -8,7 +8,7 @@ from scenario_player import results_of
 @pytest.fixture(scope="module")
 def seen(tmp_path_factory):
     """Results of window_engine.py."""
-    return results_of("window_engine", tmp_path_factory.mktemp("window"))
+    return results_of("window_engine", tmp_path_factory.mktemp("window"), size=(640, 480))
 
 
 def test_f12_shows_the_baked_image(seen):
