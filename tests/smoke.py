@@ -32,7 +32,8 @@ def refused(error, work, *arguments, **keywords):
 
 
 def libraries(folder):
-    slab = simulate(Medium(g=0.5, ior=1.4, thickness=3.0), angles=[0, 30, 60, 85], photons=2000, seed=2, threads=THREADS)
+    of_slab = Medium(g=0.5, ior=1.4, thickness=3.0)
+    slab = simulate(of_slab, angles=[0, 30, 60, 85], photons=2000, seed=2, threads=THREADS)
     half_space = simulate(Medium(), angles=[0, 45], photons=500, threads=THREADS, progress=lambda fraction: True)
     for library in (slab, half_space):
         path = str(Path(folder) / "library.exr")
