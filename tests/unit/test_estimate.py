@@ -241,14 +241,38 @@ def test_bodies_take_as_long_as_measured(texels, pieces, channels, bending, path
     """CPU seconds of whole bakes in Blender 4.5 below a lamp, in a new session: marble's albedos, and paths scaled to
     texels.
     """
-    facts = {"pieces": pieces, "channels": channels, "bending": bending, "path": path}
+    facts = {"pieces": pieces, "channels": channels, "bending": bending, "path": path, "ior": 1.5}
     load = Workload(texels, is_bent=True, lamps=1, lit=0.5, **facts)
     assert cpu / 1.5 < load.seconds(replace(SETTINGS, threads=1)) < cpu * 1.5
 
 
+SKY_AND_LAMP = {"broad_rays": 32, "broad_traced": 15, "narrow_rays": 64, "narrow_traced": 11}
+
+
+@pytest.mark.parametrize(
+    ("texels", "pieces", "turning", "path", "ior", "light", "cpu"),
+    [
+        (260_600, 1.02, 1.1, 1.0, 1.0, {"lamps": 1}, 4.6),  # hills
+        (260_600, 1.02, 1.1, 4.0, 1.0, {"lamps": 1}, 6.7),
+        (260_600, 1.02, 1.1, 16.0, 1.0, {"lamps": 1}, 13.2),
+        (181_300, 1.55, 3.3, 1.0, 1.0, {"lamps": 1}, 7.9),  # a smooth monkey
+        (181_300, 1.55, 3.3, 4.0, 1.0, {"lamps": 1}, 36.0),
+        (181_300, 1.55, 3.3, 4.0, 1.0, {"broad_rays": 8, "broad_traced": 8}, 46.5),
+        (181_300, 1.55, 3.3, 4.0, 1.5, {"broad_rays": 8, "broad_traced": 8}, 13.5),
+        (169_900, 1.49, 1.0, 4.0, 1.5, {"broad_rays": 8, "broad_traced": 8}, 3.3),  # a UV sphere
+        (160_400, 1.23, 3.3, 1.1, 1.5, {**SKY_AND_LAMP, "bounced": True}, 10.0),  # another smooth monkey
+    ],
+)
+def test_bodies_under_skies_and_of_index_1_take_as_long_as_measured(texels, pieces, turning, path, ior, light, cpu):
+    """CPU seconds as above, of light of one direction or of an even sky, or of both, of a size, and bounces."""
+    facts = {"lit": 0.5 if "lamps" in light else 1.0, "bending": Bending(turning, 0.0), "path": path, "ior": ior}
+    load = Workload(texels, is_bent=True, pieces=pieces, triangles=15_000, **facts, **light)
+    assert cpu / 1.6 < load.seconds(replace(SETTINGS, threads=1)) < cpu * 1.6
+
+
 def test_slabs_that_bend_take_longer_the_farther_their_light_spreads():
     """All of their texels are solved."""
-    shade = Workload(170_000, is_bent=True, path=2.3, thickness=2.0)
+    shade = Workload(170_000, is_bent=True, path=2.3, ior=1.5, thickness=2.0)
     assert shade.seconds(SETTINGS) > 2 * replace(shade, path=0.23).seconds(SETTINGS)
     assert shade.seconds(SETTINGS) > 2 * replace(shade, thickness=math.inf).seconds(SETTINGS)
 

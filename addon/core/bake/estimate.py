@@ -59,8 +59,10 @@ BENT, BENT_SAMPLE, BENT_CHANNEL = 1.1, 0.6e-6, 2.1e-6
 # The same of a sample with a mean free path of a texel on a ball; they grow with these powers of the path, and of a
 # surface's turning relative to a ball's, up to this one.
 BENT_PATH, PATH_POWER, TURNING_POWER, MAX_TURNING = 0.3e-6, 1.1, 1.5, 5.0
-# Multiple where the noise of light from all around differs from texel to texel.
-BENT_NOISY = 2.0
+# Multiples at an index of 1, where light that leaves depends on more functions: of samples, and of their paths.
+PLAIN_SAMPLE, PLAIN_PATH = 2.7, 5.5
+# Seconds of a sample for each ray to a light of a size, and of a texel for bounced light.
+BENT_RAY, BENT_BOUNCED = 0.06e-6, 5e-6
 # On slabs that bend, whose texels are all solved: for each sample, and each channel of its own there, with a mean free
 # path of a texel; the powers of the path and of the turning.
 SLAB_SAMPLE, SLAB_CHANNEL, SLAB_PATH_POWER, SLAB_TURNING_POWER = 4.5e-6, 10.5e-6, 0.55, 0.75
@@ -243,11 +245,12 @@ class Workload:
                 of_sample = (SLAB_SAMPLE + SLAB_CHANNEL * self.channels) * self.path**SLAB_PATH_POWER
                 of_sample *= turning**SLAB_TURNING_POWER
             else:
+                per_sample, per_path = (PLAIN_SAMPLE, PLAIN_PATH) if self.ior <= 1 else (1.0, 1.0)
                 of_path = BENT_PATH * self.channels * self.path**PATH_POWER * turning**TURNING_POWER
-                of_sample = BENT_SAMPLE + BENT_CHANNEL * self.channels + of_path
-                of_sample *= BENT_NOISY if self.broad_rays else 1.0
+                of_sample = per_sample * (BENT_SAMPLE + BENT_CHANNEL * self.channels) + per_path * of_path
+            of_light = BENT_RAY * (self.broad_rays + self.narrow_rays) * self.pieces + BENT_BOUNCED * self.bounced
             of_creases = CREASE * self.bending.creases * self.channels * self.path**CREASE_PATH * self.texels**0.5
-            return BENT + (of_sample * self.texels * self.pieces + of_creases) * self.lit
+            return BENT + (of_sample * self.texels * self.pieces + of_creases) * self.lit + of_light * self.texels
         if settings.solver != "fft":
             sun, direction = ADAPTIVE if settings.solver == "adaptive" else DIRECT
             pairs = self.texels if settings.solver == "adaptive" else self.texels**2
