@@ -29,7 +29,7 @@ constexpr Bindings all_bindings[] = {
 // NOLINTNEXTLINE(bugprone-reserved-identifier, readability-identifier-naming): the name that Python looks for
 PyMODINIT_FUNC PyInit__native()
 {
-    // As "3.11.2 (main, ...)". Objects of a free-threaded Python have other fields.
+    // The text begins with the version, and names a build without the lock: its objects have another layout.
     const char* const version = Py_GetVersion();
     const bool free_threaded = std::strstr(version, "free-threading") != nullptr;
     const long minor = std::strncmp(version, "3.", 2) == 0 ? std::strtol(version + 2, nullptr, 10) : -1;
