@@ -160,6 +160,21 @@ def test_mirrored_and_inside_out_bodies_are_baked_as_whole_ones():
     assert any("point inward; it is baked as if they pointed outward" in line for line in state.lines())
 
 
+def test_an_inside_out_body_of_two_materials_is_baked_as_a_whole_one():
+    ball = add_ball()
+    ball.data.materials.append(bpy.data.materials.new("Plain"))
+    for polygon in ball.data.polygons:
+        polygon.material_index = int(polygon.center.x > 0.1)
+    scenes.add_sun(0)
+    first = scenes.bake(ball)[0].copy()
+    ball.data.flip_normals()
+    bpy.context.view_layer.update()
+    # The other diagonals of flipped quads change light that grazes the surface by up to .0025.
+    np.testing.assert_allclose(scenes.bake(ball)[0], first, rtol=0.01, atol=0.005)
+    assert first.max() > 0.07
+    assert any("point inward; it is baked as if they pointed outward" in line for line in state.lines())
+
+
 def test_a_bent_and_a_flat_object_share_an_image():
     ball = add_ball()
     plane = scenes.add_plane("Plane", material=None)

@@ -104,6 +104,21 @@ def test_closed_bodies_look_outward_and_hollows_into_themselves():
     assert np.einsum("nc,nc->n", grid.positions()[shown], grid.normals[shown]).max() < -0.4
 
 
+@pytest.mark.parametrize("is_hollow", [False, True])
+def test_faces_of_other_materials_tell_which_side_of_a_body_is_outside(is_hollow):
+    """Half of a ball is open, but not with the other half; as the hollow of a larger ball, the same faces stay."""
+    whole = replace(ball(), normals=-ball().normals, corner_normals=-ball().corner_normals)
+    half = np.flatnonzero(whole.corners[whole.starts[:-1], 2] > 0)
+    part = replace(whole.of_faces(half), whole=joined(whole, ball(radius=2.0)) if is_hollow else whole)
+    mesh = flatten(part, name="Ball")
+    said = [message.text for message in mesh.messages if "inward" in message.text]
+    assert len(said) == (not is_hollow)
+    (island,) = mesh.parts[0].islands
+    outward = np.einsum("nc,nc->n", island.polygons.corners[::3], island.polygons.normals)
+    assert (outward < 0).all() if is_hollow else (outward > 0).all()
+    assert island.polygons.whole is None
+
+
 def test_doubled_faces_and_faces_that_look_to_the_other_side_are_named():
     said = [str(message) for message in grid_of(joined(ball(), ball()))[2].messages]
     assert any(text.startswith("Faces of 'Ball' lie on each other, 100% of its surface") for text in said)

@@ -247,21 +247,29 @@ def read_polygons(obj, material_name: str, matrix=None, uv_map: str = "", is_til
         if mesh is None or not len(mesh.polygons):
             raise ReceiverError(f"'{obj.name}' has no faces.", NO_FACES_REMEDY.get(obj.type, NO_FACES_REMEDY["MESH"]))
         _check_memory(obj, mesh)
-        chosen = faces_with(obj, mesh, {material_name})
+        chosen, everything = faces_with(obj, mesh, {material_name}), polygons_of(mesh, matrix)
         if uv_map:
             uvs = _uvs_by_name(obj, mesh, uv_map)
-            return placed(replace(polygons_of(mesh, matrix), uvs=uvs, uv_map=uv_map).of_faces(chosen))
-        polygons = placed(polygons_of(mesh, matrix).of_faces(chosen))
+            return placed(_part(replace(everything, uvs=uvs, uv_map=uv_map), chosen))
+        polygons = placed(_part(everything, chosen))
         uvs = _uvs(mesh, OWN_MAP)
         if uvs is None or not polygons.count:
             return polygons
         if _fits(polygons):
             # By its name, so that the image keeps it when the artist makes another one render.
             return replace(polygons, uv_map=OWN_MAP) if _renders(mesh, OWN_MAP) else polygons
-        again = placed(replace(polygons_of(mesh, matrix), uvs=uvs.astype(float), uv_map=OWN_MAP).of_faces(chosen))
+        again = placed(_part(replace(everything, uvs=uvs.astype(float), uv_map=OWN_MAP), chosen))
         return again if _fits(again) else polygons
     finally:
         obj.to_mesh_clear()
+
+
+def _part(everything: Polygons, chosen: np.ndarray) -> Polygons:
+    """Some faces of a mesh, which know the others unless their positions are not finite."""
+    part = everything.of_faces(chosen)
+    if part.count == everything.count or not everything.is_finite.all():
+        return part
+    return replace(part, whole=replace(everything, uvs=None))
 
 
 def remedy_for(obj, remedy: str) -> str:

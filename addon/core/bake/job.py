@@ -233,7 +233,8 @@ class BakeJob:
         if self._surely_dark() or not self.is_dark():
             return []
         text = f"No light reaches '{self.name}', so it is black."
-        return [warning(self.name, text, "Look for objects that block the light.")]
+        remedy = "Look for objects that block the light, and for normals that point inward."
+        return [warning(self.name, text, remedy)]
 
 
 def _log_new_lights(job: BakeJob, before: BakeJob) -> None:

@@ -102,18 +102,18 @@ def _outward(polygons: Polygons, corners: np.ndarray, owners: np.ndarray) -> Pol
 
 
 def facing_outward(
-    polygons: Polygons, name: str, spread: float = 0.0, is_sheet: bool = False
+    polygons: Polygons, name: str, spread: float = 0.0, is_sheet: bool = False, whole: Polygons | None = None
 ) -> tuple[Polygons, list[Message]]:
     """The faces of the object `name` with closed bodies turned right side out, and messages about faces gone wrong.
 
     `spread`: how far light spreads, for the message about loose parts; 0: nowhere. The normals of a sheet tell its
-    front, and stay.
+    front, and stay. `whole`: all faces of the mesh, since bodies may have several materials; None: these are all.
     """
     body_of = bodies_of(polygons)
     messages = [*_faults(polygons, name), *_loose_parts(polygons, body_of, spread, name)]
     if is_sheet:
         return polygons, messages
-    is_inward = _is_inside_out(polygons, body_of)[body_of]
+    is_inward = _looks_inward(polygons, body_of) if whole is None else _looks_inward(whole)[polygons.numbers]
     if is_inward.any():
         are = "The normals" if is_inward.all() else f"The normals of {polygons.listed(is_inward)}"
         text = f"{are} of '{name}' point inward; it is baked as if they pointed outward."
@@ -128,6 +128,12 @@ def _turned(polygons: Polygons, is_chosen: np.ndarray) -> Polygons:
     shading = polygons.corner_normals
     shading = None if shading is None else shading * signs[polygons.face_of].astype(np.float32)
     return replace(polygons, normals=polygons.normals * signs, corner_normals=shading)
+
+
+def _looks_inward(polygons: Polygons, body_of: np.ndarray | None = None) -> np.ndarray:
+    """True for each face of a body that is inside out; `body_of` is the result of `bodies_of` if that is known."""
+    body_of = bodies_of(polygons) if body_of is None else body_of
+    return _is_inside_out(polygons, body_of)[body_of]
 
 
 def _is_inside_out(polygons: Polygons, body_of: np.ndarray) -> np.ndarray:

@@ -95,12 +95,12 @@ def flatten(
         without area.
     """
     check_faces(polygons, name)
-    tolerance = _tolerance(polygons, mean_free_path)
+    tolerance, whole, polygons = _tolerance(polygons, mean_free_path), polygons.whole, polygons.alone()
     polygons, planes, bent = _planes_of(polygons, tolerance)
     check_uvs(polygons.uvs)
     about_sheet = sheet_messages(polygons, name) if is_sheet else []
     if len(bent) or _edge_part(polygons, planes, spread) > MAX_EDGES:
-        polygons, messages = facing_outward(polygons, name, spread, is_sheet)
+        polygons, messages = facing_outward(polygons, name, spread, is_sheet, whole)
         messages += about_sheet + lost_in_map(polygons, name)
         return FlatMesh((bent_part(polygons),), tuple(messages), polygons.uv_map)
     exact = FLATNESS_TOLERANCE * polygons.diagonal

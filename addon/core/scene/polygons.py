@@ -36,6 +36,7 @@ class Polygons:
     numbers : int (N,), numbers of the faces in the mesh; None: all in their order.
     tiles : int (N,), number of each face's UDIM tile, in which its UVs lie; None: one image.
     corner_normals : float32 (K, 3), shading normals of the corners, world; None: those of the faces.
+    whole : all faces of the mesh, of which these have the `numbers`; None: these are all, or the others don't matter.
     """
 
     corners: np.ndarray
@@ -46,6 +47,7 @@ class Polygons:
     numbers: np.ndarray | None = None
     tiles: np.ndarray | None = None
     corner_normals: np.ndarray | None = None
+    whole: Polygons | None = None
 
     @property
     def count(self) -> int:
@@ -157,6 +159,14 @@ class Polygons:
             return self
         same = copy(self)
         object.__setattr__(same, "numbers", np.arange(self.count))
+        return same
+
+    def alone(self) -> Polygons:
+        """The same polygons without the `whole` mesh, and all that is known of them."""
+        if self.whole is None:
+            return self
+        same = copy(self)
+        object.__setattr__(same, "whole", None)
         return same
 
     def by_tile(self) -> dict[int, Polygons]:
