@@ -259,14 +259,37 @@ def test_an_object_that_comes_later_has_a_place_once_the_image_is_new():
     assert all(row.status == Status.BAKED for row in state.rows.values())
 
 
-def test_faces_of_other_materials_keep_an_object_from_maps_side_by_side():
-    """A later bake of these would move them all."""
-    box, beveled, *_ = bodies_of_one_material()
+def test_objects_of_several_materials_get_maps_side_by_side():
+    """Each object has some of the materials, as parts of characters do; one has faces of a plain one, too."""
+    box, beveled, twin, _ = bodies_of_one_material()
+    second = scenes.add_material("Second")
+    for obj in (box, beveled):
+        obj.data.materials.append(second)
+        obj.data.polygons[0].material_index = 1
     beveled.data.materials.append(bpy.data.materials.new("Plain"))
-    beveled.data.polygons[0].material_index = 1
-    scenes.select(box, beveled)
-    assert "to the same part of the image" in scenes.messages_of(bpy.ops.beamspread.bake)
-    assert "side by side" not in "\n".join(state.lines())
+    beveled.data.polygons[1].material_index = 2
+    twin.data.materials.append(scenes.add_material("Of no face"))
+    scenes.select(box, beveled, twin)
+    bpy.ops.beamspread.bake()
+    said = "\n".join(state.lines())
+    assert said.count("The 3 objects with the materials 'Medium' and 'Second' lie side by side in it.") >= 3
+    assert "No face" not in said
+    names = {(row.target.object_name, row.target.material_name) for row in state.rows.values()}
+    assert names == {(obj.name, name) for obj in (box, beveled, twin) for name in ("Medium", "Second")}
+    assert all(row.status == Status.BAKED for row in state.rows.values())
+    images = {name: scenes.node_of(bpy.data.materials[name]).image for name in ("Medium", "Second")}
+    for name, image in images.items():
+        shown = np.zeros(scenes.pixels(image).shape[:2], int)
+        for obj in (box, beveled, twin):
+            for column, row, coverage in read_parts(Target(obj.name, name), tuple(image.size)):
+                within(shown, column, row, coverage)[...] += coverage > 0.5
+        assert shown.max() == 1
+    # A later node of the plain material has its place beside them.
+    before = scenes.pixels(images["Medium"]).copy()
+    bpy.data.materials["Plain"].use_nodes = True
+    bpy.data.materials["Plain"].node_tree.nodes.new("BeamspreadNode")
+    assert scenes.bake(beveled)[0].max() > 0
+    assert np.array_equal(scenes.pixels(images["Medium"]), before)
 
 
 def test_an_object_whose_material_has_an_image_gets_a_map_alone():

@@ -3,6 +3,7 @@
 import bpy
 import pytest
 from beamspread.blender.jobs.state import Status, state
+from beamspread.blender.node.find import find_targets
 from panel_layout import panel
 from scenes import add_material, add_mesh, add_plane, add_sun, bake, glowing_material, select
 
@@ -118,6 +119,24 @@ def test_mesh_that_can_not_be_baked_says_why_before(spoil, reason, selected):
     said = panel()
     assert "Plane: Can't be baked" in said
     assert said.replace(" ", "").count(reason.replace(" ", "")) == 1  # said once, however it is wrapped
+
+
+@pytest.mark.parametrize("modifier", ["", "MIRROR", "SOLIDIFY", "NODES"])
+def test_a_material_without_faces_is_left_out_beside_others(modifier):
+    """Slots of imported characters often have none. A modifier that may set the material keeps it in."""
+    plane = add_plane(material=add_material())
+    plane.data.materials.append(add_material("Unused"))
+    if modifier:
+        plane.modifiers.new("M", modifier)
+    if modifier == "SOLIDIFY":
+        plane.modifiers["M"].material_offset = 1
+    if modifier == "NODES":
+        plane.modifiers["M"].node_group = tree = bpy.data.node_groups.new("Sets", "GeometryNodeTree")
+        tree.nodes.new("GeometryNodeSetMaterial")
+    is_kept = modifier in ("SOLIDIFY", "NODES")
+    assert [target.material_name for target in find_targets([plane])] == ["Medium", "Unused"][: 1 + is_kept]
+    plane.data.polygons[0].material_index = 1
+    assert [target.material_name for target in find_targets([plane])] == ["Medium", "Unused"][not is_kept :]
 
 
 def test_bake_without_a_selected_node_says_that_it_bakes_all():

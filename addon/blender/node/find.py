@@ -14,6 +14,7 @@ from ...core.target import FRONT, Target
 from .. import compat
 from ..read.nodes import InputSocket
 from ..read.visibility import RECEIVER_TYPES, UNKNOWN_TYPES, count_instances, render_visible_names, with_instanced
+from .faced import materials_with_faces
 from .node import BeamspreadNode, image_of_side
 from .output import is_linked
 
@@ -115,10 +116,15 @@ def _has_one_user(group) -> bool:
 
 
 def targets_of(obj) -> list[BakeTarget]:
-    """The targets of an object: its materials that have a Beamspread node, each once for each side with an image."""
+    """The targets of an object: its materials that have a Beamspread node, each once for each side with an image.
+
+    Materials that no face uses are left out, unless all are.
+    """
     materials = _all_materials(obj) if obj.type in RECEIVER_TYPES else ()
     places = ((material, find_node_in_groups(material)) for material in materials)
     found = [(material, *place) for material, place in places if place is not None]
+    used = materials_with_faces(obj) if len(found) > 1 else None
+    found = [item for item in found if used is None or item[0] in used] or found
     return [BakeTarget(obj, material, node, groups, side) for material, node, groups in found for side in node.sides()]
 
 

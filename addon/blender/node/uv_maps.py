@@ -36,12 +36,12 @@ def make_maps(depsgraph, targets: Iterable[Target], fills_nodes: bool = False) -
     targets = list(targets)
     problems = problems_of(depsgraph, targets)
     outcomes: dict[str, Outcome] = {}
-    for material, objects in _sharing(depsgraph, targets, problems).items() if fills_nodes else ():
-        make_maps_together(depsgraph, {obj: {material} for obj in objects})
+    for objects, materials in _sharing(depsgraph, targets, problems) if fills_nodes else ():
+        make_maps_together(depsgraph, {obj: _materials_of(obj) for obj in objects})
         depsgraph.update()
         names = {obj.name for obj in objects}
         names -= set(problems_of(depsgraph, [target for target in targets if target.object_name in names]))
-        beside = f"The {len(names)} objects with the material '{material}' lie side by side in it."
+        beside = f"The {len(names)} objects with {_named(materials)} lie side by side in it."
         for obj in objects:
             if obj.name in names:
                 problem = problems.get(obj.name, "The image is new.")
@@ -50,33 +50,57 @@ def make_maps(depsgraph, targets: Iterable[Target], fills_nodes: bool = False) -
     return outcomes | {name: _make(depsgraph, name, targets, problem) for name, problem in rest.items()}
 
 
-def _sharing(depsgraph, targets: Iterable[Target], problems: Collection[str]) -> dict[str, list]:
-    """Objects of one material that has no image yet, by that material, if bakes make or have made their maps."""
+def _sharing(depsgraph, targets: Iterable[Target], problems: Collection[str]) -> list[tuple[list, list[str]]]:
+    """Objects that share materials without an image yet, with these, if bakes make or have made their maps.
+
+    An object has one map for all of its materials, so those that share one material share the places of all.
+    """
     by_object: dict[str, dict[str, Target]] = defaultdict(dict)
     for target in targets:
         by_object[target.object_name][target.material_name] = target
-    sharing: dict[str, list] = defaultdict(list)
+    groups: list[tuple[list, list[str]]] = []
     for name, instance in find_instances(depsgraph, set(by_object)).items():
-        obj, (material, *others) = instance.obj.original, by_object[name]
-        node = node_of(by_object[name][material])
-        if others or obj.type not in RECEIVER_TYPES or not (name in problems or _has_own_map(obj)):
+        obj, own = instance.obj.original, by_object[name]
+        if obj.type not in RECEIVER_TYPES or not (name in problems or _has_own_map(obj)):
             continue
-        if node is None or node.uv_map or uses_tiles(node) or node.image or node.image_back:
+        if not all(_wants_image(node_of(target)) for target in own.values()):
             continue
-        if _is_foreign(obj) or getattr(obj.data, "is_editmode", False) or not _is_of(depsgraph, obj, material):
+        if _is_foreign(obj) or getattr(obj.data, "is_editmode", False) or not _has_materials(depsgraph, obj):
             continue
         # A map that is made after subdivisions fits one of their levels alone.
-        if not _last_subdivisions(obj):
-            sharing[material].append(obj)
-    return {material: objects for material, objects in sharing.items() if len(objects) > 1}
+        if _last_subdivisions(obj):
+            continue
+        joined = [group for group in groups if not own.keys().isdisjoint(group[1])]
+        groups = [group for group in groups if group not in joined]
+        objects = [obj for group in joined for obj in group[0]]
+        materials = dict.fromkeys([*(name for group in joined for name in group[1]), *own])
+        groups.append(([*objects, obj], list(materials)))
+    return [group for group in groups if len(group[0]) > 1]
 
 
-def _is_of(depsgraph, obj, material: str) -> bool:
-    """True if all faces of an object, after its modifiers, carry the material."""
+def _wants_image(node) -> bool:
+    """True if the first bake of a node will make an image and choose a map for it."""
+    return node is not None and not (node.uv_map or uses_tiles(node) or node.image or node.image_back)
+
+
+def _materials_of(obj) -> set[str]:
+    """Names of all materials of an object. One that gets a node later has its place, too."""
+    return {slot.material.name for slot in obj.material_slots if slot.material is not None}
+
+
+def _named(materials: list[str]) -> str:
+    first, *others = materials
+    if not others:
+        return f"the material '{first}'"
+    return f"the materials '{first}' and {repr(others[0]) if len(others) == 1 else f'{len(others)} more'}"
+
+
+def _has_materials(depsgraph, obj) -> bool:
+    """True if all faces of an object, after its modifiers, carry a material: a later bake may need places for all."""
     evaluated = obj.evaluated_get(depsgraph)
     try:
         mesh = evaluated.to_mesh()
-        return len(faces_with(evaluated, mesh, {material})) == len(mesh.polygons)
+        return len(faces_with(evaluated, mesh, _materials_of(obj))) == len(mesh.polygons)
     finally:
         evaluated.to_mesh_clear()
 
