@@ -17,8 +17,8 @@ DELAY_SECONDS = 0.05
 
 
 def wrap(text: str, width: int) -> list[str]:
-    """Lines of at most `width` letters, unless a word is longer."""
-    return textwrap.wrap(text, width, break_long_words=False, break_on_hyphens=False) or [""]
+    """Lines of at most `width` letters; longer words, as names of objects, are broken."""
+    return textwrap.wrap(text, width, break_on_hyphens=False) or [""]
 
 
 def show_soon(title: str, messages: list[str]) -> None:

@@ -4,6 +4,7 @@ import bpy
 import pytest
 from beamspread.blender.jobs.state import Status, state
 from beamspread.blender.node.find import find_targets
+from beamspread.blender.popup import wrap
 from panel_layout import panel
 from scenes import add_material, add_mesh, add_plane, add_sun, bake, glowing_material, select
 
@@ -137,6 +138,14 @@ def test_a_material_without_faces_is_left_out_beside_others(modifier):
     assert [target.material_name for target in find_targets([plane])] == ["Medium", "Unused"][: 1 + is_kept]
     plane.data.polygons[0].material_index = 1
     assert [target.material_name for target in find_targets([plane])] == ["Medium", "Unused"][not is_kept :]
+
+
+def test_long_names_are_broken_rather_than_cut_off():
+    """Names that differ at their ends alone must differ in a narrow panel."""
+    name = "Armchair_of_the_living_room.001"
+    lines = wrap(f"{name}: Never baked", 20)
+    assert max(map(len, lines)) <= 20
+    assert "".join(lines).startswith(name)
 
 
 def test_bake_without_a_selected_node_says_that_it_bakes_all():
