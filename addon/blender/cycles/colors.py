@@ -54,6 +54,10 @@ class BaseColorByCycles(Step):
 
     name = "Evaluating the base color"
 
+    @property
+    def finds_albedos(self) -> bool:
+        return self.use.is_scattered
+
     def seconds(self, job: BakeJob) -> float:
         return 0.0 if self.target in self.copy.base_colors else cycles_color_seconds(job.receiver.coverage.size)
 

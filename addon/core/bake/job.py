@@ -37,11 +37,13 @@ class Step(ABC):
     name : for messages.
     finds_light : True if the step may add lights to the job.
     finds_world : True if the step adds the light of the world.
+    finds_albedos : True if the step gives the texels albedos of their own.
     """
 
     name = ""
     finds_light = False
     finds_world = False
+    finds_albedos = False
 
     @abstractmethod
     def run(self, job: BakeJob, progress: Progress) -> BakeJob:

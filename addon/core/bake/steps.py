@@ -21,7 +21,7 @@ from .layers import LAYERS, WITHOUT_MEDIUM, rays_without_medium
 from .spread_light import rays_per_texel
 from .spreading import FINAL_EFFORT, Reports
 from .surface import Surface
-from .textured_bake import noisy_note
+from .textured_bake import noisy_note, why_multiplied
 
 SUNS, NARROW, WIDE = range(3)
 """Kinds of light: suns alone; one direction at each texel; any other."""
@@ -197,8 +197,10 @@ def _rays(job: BakeJob, samples: int) -> int:
 
 
 def textured_texels(job: BakeJob) -> int:
-    """Texels in which light scatters by albedos of their own."""
-    grids = (chart.grid for chart in job.receiver.charts)
+    """Texels in which light scatters by albedos of their own, also by those that a step of the job will find."""
+    grids = [chart.grid for chart in job.receiver.charts]
+    if any(step.finds_albedos for step in job.steps) and not why_multiplied(job.settings):
+        return sum(grid.texels for grid in grids)
     return sum(grid.texels for grid in grids if grid.base_color is not None or grid.albedo is not None)
 
 
