@@ -28,7 +28,8 @@ py::tuple textured(const Medium& medium, std::array<double, 2> texels_per_path, 
                    const Array<float>& factor, double mean_albedo, const Array<float>& convention,
                    const std::vector<std::pair<Array<float>, Numbers>>& lights, const std::string& side_name,
                    double tolerance, std::size_t max_walks, std::uint64_t seed, int threads, const py::object& callback,
-                   int channel, const std::optional<Array<float>>& coverage, std::optional<Array<float>> result)
+                   int channel, const std::optional<Array<float>>& coverage, std::optional<Array<float>> result,
+                   double max_more)
 {
     TexturedProblem problem{medium,
                             texels_per_path,
@@ -46,6 +47,7 @@ py::tuple textured(const Medium& medium, std::array<double, 2> texels_per_path, 
         reject("side", "'transmitted'", "'reflected' on half-spaces");
     problem.tolerance = tolerance;
     problem.max_walks = max_walks;
+    problem.max_more = max_more;
     problem.seed = seed;
     problem.threads = threads;
     Progress progress(progress_callback(callback));
@@ -70,6 +72,7 @@ void bind_textured(py::module_& m)
           py::arg("mean_albedo"), py::arg("convention"), py::arg("lights"), py::arg("side"), py::arg("tolerance"),
           py::arg("max_walks"), py::arg("seed") = 0, py::arg("threads") = 0, py::arg("progress") = py::none(),
           py::arg("channel") = 0, py::arg("coverage") = py::none(), py::arg("result").noconvert() = py::none(),
+          py::arg("max_more") = 1.0,
           R"(Luminance of a plane whose albedo differs from texel to texel, one channel.
 
 Parameters
@@ -106,6 +109,8 @@ coverage : ndarray, float32, optional
     Fraction of each texel that light enters; 1 without it.
 result : ndarray, float32, optional
     Takes the luminance, and is returned; it may be `convention`.
+max_more : float, optional
+    Largest multiple of `max_walks` where lights of the same angle share walks: as many as take the time of one light.
 
 Returns
 -------

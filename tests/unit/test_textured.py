@@ -201,6 +201,27 @@ def test_lights_share_the_walks():
     assert 0.6 < error(8) / error(1) < 1.6
 
 
+def test_lights_of_one_angle_turn_the_same_walks():
+    """Four spots before bright squares, all of it turned by 90 degrees from one to the next. The same light leaves each
+    quarter, within 5 %, twice the noise of sums; all that goes one way is 90 % off. Walks are more, too.
+    """
+    albedo, spot = np.full((32, 32), 0.3), np.zeros((32, 32))
+    albedo[10:22, 18:30], spot[10:22, 8:18] = 0.98, 1
+    ways = (0.96, 0.0, -0.28), (0.0, -0.96, -0.28), (-0.96, 0.0, -0.28), (0.0, 0.96, -0.28)
+
+    def quarters(values):
+        turned = [np.rot90(each, number) for number, each in enumerate(values)]
+        return np.ascontiguousarray(np.block([turned[:2], turned[2:]]), np.float32)
+
+    lights = [(quarters([spot * (k == number) for k in range(4)]), way) for number, way in enumerate(ways)]
+    even, factor = convolve_lights(lights, LDF, 0.8, 3.0, 1.0)[..., 0], np.ones((64, 64), np.float32)
+    arguments = LDF.medium, (3.0, 3.0), quarters([albedo] * 4), factor, 0.8, np.ascontiguousarray(even)
+    found, _, walks = native.textured(*arguments, lights, "reflected", 1e-6, 4096, 3, max_more=1.5)
+    assert walks == 6144
+    sums = found.reshape(2, 32, 2, 32).sum(axis=(1, 3), dtype=float)
+    assert np.abs(sums / sums.mean() - 1).max() < 0.05
+
+
 def test_walks_belong_to_the_lights_that_shine_there():
     """Eight lights, each on rows of its own: 1.2 times the noise of one, in as many walks. Bound: 1.6, since two
     numbers differ by a tenth. Where each has the same part of the walks in all rows, it is 4.4 times.

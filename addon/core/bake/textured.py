@@ -24,6 +24,9 @@ SURVIVAL_POWER, LONG_WALK, MOST_SHORT = 1.5, 30.0, 8.0
 """Walks go on with this power of the brightest albedo. Those of fewer scatterings than the second number may be more,
 by up to the third: dark textures return few of them. Larger: less noise there, longer."""
 
+MOST_SHARED = 4.0
+"""Most walks of light of many azimuths over those of one, in the same time. Larger: less noise in few texels."""
+
 LEAST_FACTOR = 0.1
 """Smallest factor by which the convention multiplies light. Smaller: the ratio to the truth has more noise in black."""
 
@@ -213,6 +216,7 @@ class TexturedPlane:
                 channel=c,
                 coverage=None if is_covered else self.coverage,
                 result=luminance,
+                max_more=MOST_SHARED,
             )
             worst = max(worst, error)
         return worst

@@ -27,14 +27,12 @@ Vec3 scattered(const Vec3& w, double g, Random& random)
 
 // The places of one walk, mean free paths: the entry, the scatterings, and the exit. Empty if light does not leave through
 // the face that counts. z points into the medium.
-void walk(const PathPlan& plan, Random& random, std::vector<Vec2>& places)
+void walk(const WalkPlan& plan, Random& random, std::vector<Vec2>& places)
 {
     const Medium& medium = plan.medium;
-    const double sine = std::hypot(plan.travel.x, plan.travel.y) / medium.ior;
-    const double length = std::hypot(plan.travel.x, plan.travel.y);
-    const Vec2 across = length > 0.0 ? Vec2(plan.travel.x, plan.travel.y) / length : Vec2(1.0, 0.0);
+    const double sine = std::sqrt(std::max(0.0, 1.0 - plan.cos_theta * plan.cos_theta)) / medium.ior;
     Vec3 x(0.0);
-    Vec3 w(sine * across.x, sine * across.y, std::sqrt(std::max(0.0, 1.0 - sine * sine)));
+    Vec3 w(sine, 0.0, std::sqrt(std::max(0.0, 1.0 - sine * sine)));
     places.assign(1, Vec2(0.0));
     for (std::size_t order = 0; order < max_scatterings;) {
         double ahead = std::numeric_limits<double>::infinity();
@@ -73,23 +71,39 @@ std::int32_t whole(double offset)
 
 }  // namespace
 
-void add_paths(SharedPaths& paths, const PathPlan& plan, std::size_t walks, Random& random)
+Walks drawn_walks(const WalkPlan& plan, std::size_t count, Random& random)
 {
+    Walks walks;
+    walks.count = count;
     std::vector<Vec2> places;
-    for (std::size_t i = 0; i < walks; ++i) {
+    for (std::size_t i = 0; i < count; ++i) {
         walk(plan, random, places);
-        // The point of its texel that light leaves. Walks that end inside draw it, too.
+        // Walks that end inside draw the point, too.
         const Vec2 within(random.uniform(), random.uniform());
         if (places.empty())
             continue;
         const Vec2 exit = places.back();
         places.pop_back();
         for (const Vec2& place : places)
-            paths.places.push_back({whole((place.x - exit.x) * plan.texels_per_path[0] + within.x),
-                                    whole((place.y - exit.y) * plan.texels_per_path[1] + within.y)});
-        paths.first.push_back(paths.places.size());
-        paths.walk.push_back(i);
+            walks.places.push_back(place - exit);
+        walks.within.push_back(within);
+        walks.first.push_back(walks.places.size());
+        walks.walk.push_back(i);
     }
+    return walks;
+}
+
+Turn::Turn(const Vec3& travel, const std::array<double, 2>& texels_per_path)
+{
+    const double length = std::hypot(travel.x, travel.y);
+    const Vec2 across = length > 0.0 ? Vec2(travel.x, travel.y) / length : Vec2(1.0, 0.0);
+    right = texels_per_path[0] * Vec2(across.x, -across.y);
+    up = texels_per_path[1] * Vec2(across.y, across.x);
+}
+
+PathPlace Turn::operator()(const Vec2& place, const Vec2& within) const
+{
+    return {whole(right.x * place.x + right.y * place.y + within.x), whole(up.x * place.x + up.y * place.y + within.y)};
 }
 
 }  // namespace beamspread

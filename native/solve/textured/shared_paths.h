@@ -12,32 +12,44 @@
 
 namespace beamspread {
 
+// How walks are drawn: light travels down into the medium, in the plane of x and z. At each scattering a walk goes on with
+// the probability `survival`, whatever the albedo there.
+struct WalkPlan {
+    Medium medium;
+    double cos_theta = 1.0;  // of the light's angle from the normal
+    double survival = 0.9;
+    bool is_through = false;  // walks leave through the far face of a slab
+};
+
+// Walks that leave through the face that counts: the entry, then each scattering.
+struct Walks {
+    std::vector<Vec2> places;  // seen from the exit, mean free paths
+    std::vector<Vec2> within;  // [path], the point of its texel that light leaves, in [0, 1)
+    std::vector<std::size_t> first{0};  // [path], and the number of all places
+    std::vector<std::size_t> walk;  // [path], ascending; other walks end inside
+    std::size_t count = 0;  // of all walks
+
+    std::size_t size() const { return walk.size(); }
+};
+
+// This many walks.
+Walks drawn_walks(const WalkPlan& plan, std::size_t count, Random& random);
+
 // Offset of a texel from the texel that light leaves.
 struct PathPlace {
     std::int32_t x;
     std::int32_t y;
 };
 
-// Paths that leave through the face that counts, as places: the entry, then each scattering.
-struct SharedPaths {
-    std::vector<PathPlace> places;
-    std::vector<std::size_t> first{0};  // [path], and the number of all places
-    std::vector<std::size_t> walk;  // [path], ascending; other walks end inside
+// How light of one azimuth goes the way of walks: they turn with it.
+struct Turn {
+    // `travel`: of the light, in the frame of the plane; `texels_per_path`: a mean free path in texels, along x and y.
+    Turn(const Vec3& travel, const std::array<double, 2>& texels_per_path);
 
-    std::size_t size() const { return walk.size(); }
+    PathPlace operator()(const Vec2& place, const Vec2& within) const;
+
+    Vec2 right;  // what mean free paths along x and y of a walk add to x, texels
+    Vec2 up;
 };
-
-// How paths are drawn: light travels along `travel`, in the frame of the plane, z < 0. At each scattering a path goes on
-// with the probability `survival`, whatever the albedo there.
-struct PathPlan {
-    Medium medium;
-    Vec3 travel{0.0, 0.0, -1.0};
-    double survival = 0.9;
-    std::array<double, 2> texels_per_path{1.0, 1.0};  // a mean free path in texels, along x and y
-    bool is_through = false;  // paths leave through the far face of a slab
-};
-
-// Adds the paths of this many walks. Each leaves at a random point of its texel.
-void add_paths(SharedPaths& paths, const PathPlan& plan, std::size_t walks, Random& random);
 
 }  // namespace beamspread

@@ -43,17 +43,22 @@ std::size_t Sublattices::texels_of(const View2D<const float>& map) const
     return 1;
 }
 
-std::ptrdiff_t Sublattices::offset(std::size_t sublattice, const PathPlace& place, std::size_t texels) const
+Offsets Sublattices::offsets(std::size_t sublattice, std::size_t texels) const
 {
     const auto of_map = static_cast<std::ptrdiff_t>(texels), side = static_cast<std::ptrdiff_t>(m_side / texels);
-    const auto reach = static_cast<std::int32_t>(m_reach);
-    const std::ptrdiff_t right = static_cast<std::ptrdiff_t>(sublattice % m_side) + std::clamp(place.x, -reach, reach);
-    const std::ptrdiff_t far = static_cast<std::ptrdiff_t>(sublattice / m_side) + std::clamp(place.y, -reach, reach);
-    const std::ptrdiff_t x = floor_div(right, of_map), y = floor_div(far, of_map);
-    const std::ptrdiff_t across = floor_div(x, side), up = floor_div(y, side);
+    const auto reach = static_cast<std::ptrdiff_t>(m_reach);
     const auto row = static_cast<std::ptrdiff_t>(stride());
     const auto plane = row * static_cast<std::ptrdiff_t>(m_tiles_down * tile_rows + 2 * m_border);
-    return ((y - up * side) * side + x - across * side) * plane + up * row + across;
+    const auto along = [&](std::size_t first, std::ptrdiff_t of_sublattice, std::ptrdiff_t of_texel) {
+        std::vector<std::ptrdiff_t> offsets;
+        for (std::ptrdiff_t away = -reach; away <= reach; ++away) {
+            const std::ptrdiff_t at = floor_div(static_cast<std::ptrdiff_t>(first) + away, of_map);
+            const std::ptrdiff_t texel = floor_div(at, side);
+            offsets.push_back((at - texel * side) * of_sublattice + texel * of_texel);
+        }
+        return offsets;
+    };
+    return {along(sublattice % m_side, plane, 1), along(sublattice / m_side, side * plane, row), m_reach};
 }
 
 AlignedVector<float> Sublattices::dealt(const View2D<const float>& values, float factor, bool goes_on) const

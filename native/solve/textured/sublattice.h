@@ -1,8 +1,11 @@
 // Planes of texels dealt to sublattices: texels whose coordinates agree modulo the number of sublattices lie side by side.
 #pragma once
 
+#include <algorithm>
 #include <cstddef>
-#include <span>
+#include <cstdint>
+#include <utility>
+#include <vector>
 
 #include "base/threads.h"
 #include "base/view.h"
@@ -10,6 +13,26 @@
 #include "solve/textured/shared_paths.h"
 
 namespace beamspread {
+
+// Indices in a plane of the places that texels of one sublattice see, less that of the tile of these texels.
+class Offsets {
+public:
+    Offsets(std::vector<std::ptrdiff_t> across, std::vector<std::ptrdiff_t> down, std::size_t reach)
+        : m_across(std::move(across)), m_down(std::move(down)), m_reach(static_cast<std::int32_t>(reach))
+    {
+    }
+
+    std::ptrdiff_t operator()(const PathPlace& place) const
+    {
+        return m_across[static_cast<std::size_t>(std::clamp(place.x, -m_reach, m_reach) + m_reach)] +
+               m_down[static_cast<std::size_t>(std::clamp(place.y, -m_reach, m_reach) + m_reach)];
+    }
+
+private:
+    std::vector<std::ptrdiff_t> m_across;  // [x + reach]
+    std::vector<std::ptrdiff_t> m_down;
+    std::int32_t m_reach;
+};
 
 class Sublattices {
 public:
@@ -37,9 +60,9 @@ public:
     // no such squares.
     std::size_t texels_of(const View2D<const float>& map) const;
 
-    // The index of a place, less that of the tile of texels that light leaves, which are of this sublattice. In planes
-    // of maps whose texels are shown by `texels` of the plane's along each axis.
-    std::ptrdiff_t offset(std::size_t sublattice, const PathPlace& place, std::size_t texels = 1) const;
+    // Offsets for texels of this sublattice, in planes of maps whose texels are shown by `texels` of the plane's along each
+    // axis.
+    Offsets offsets(std::size_t sublattice, std::size_t texels) const;
     bool is_within(const PathPlace& place) const;
 
     // A plane of these sublattices, or of those that `texels_of` a coarser map need. Beyond the border values continue,

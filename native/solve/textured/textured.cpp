@@ -83,18 +83,59 @@ std::vector<View2D<const float>> irradiances_of(const TexturedProblem& problem)
     return irradiances;
 }
 
+// Walks of one angle from the normal, and the lights that they turn to.
+struct WalkGroup {
+    WalkPlan plan;
+    std::vector<std::size_t> lights;
+};
+
+std::vector<WalkGroup> groups_of(const TexturedProblem& problem, double survival)
+{
+    std::vector<WalkGroup> groups;
+    for (std::size_t i = 0; i < problem.lights.size(); ++i) {
+        const double cos_theta = -problem.lights[i].travel.z;
+        auto group = std::ranges::find(groups, cos_theta, [](const WalkGroup& each) { return each.plan.cos_theta; });
+        if (group == groups.end())
+            group =
+                groups.insert(groups.end(), WalkGroup{{problem.medium, cos_theta, survival, problem.is_through}, {}});
+        group->lights.push_back(i);
+    }
+    return groups;
+}
+
+std::vector<std::vector<std::size_t>> lights_of(const std::vector<WalkGroup>& groups)
+{
+    std::vector<std::vector<std::size_t>> lights;
+    for (const WalkGroup& group : groups)
+        lights.push_back(group.lights);
+    return lights;
+}
+
+std::vector<Turn> turns_of(const TexturedProblem& problem)
+{
+    std::vector<Turn> turns;
+    for (const TexturedLight& light : problem.lights)
+        turns.emplace_back(light.travel, problem.texels_per_path);
+    return turns;
+}
+
 // Distance that all but a few paths stay within, texels.
-std::size_t reach_of(const std::vector<PathPlan>& plans, std::size_t walks, std::uint64_t seed)
+std::size_t reach_of(const std::vector<WalkGroup>& groups, const std::vector<Turn>& turns, std::size_t count,
+                     std::uint64_t seed)
 {
     std::vector<std::int32_t> farthest;
-    for (std::size_t i = 0; i < plans.size(); ++i) {
-        SharedPaths paths;
+    for (std::size_t i = 0; i < groups.size(); ++i) {
         Random random(seed, path_stream, ~static_cast<std::uint64_t>(i));
-        add_paths(paths, plans[i], (walks + plans.size() - 1) / plans.size(), random);
-        for (std::size_t p = 0; p < paths.size(); ++p) {
+        const std::vector<std::size_t>& lights = groups[i].lights;
+        const Walks walks =
+            drawn_walks(groups[i].plan, (count * lights.size() + turns.size() - 1) / turns.size(), random);
+        for (std::size_t p = 0; p < walks.size(); ++p) {
+            const Turn& turn = turns[lights[p % lights.size()]];
             std::int32_t most = 0;
-            for (std::size_t k = paths.first[p]; k < paths.first[p + 1]; ++k)
-                most = std::max({most, std::abs(paths.places[k].x), std::abs(paths.places[k].y)});
+            for (std::size_t k = walks.first[p]; k < walks.first[p + 1]; ++k) {
+                const PathPlace place = turn(walks.places[k], walks.within[p]);
+                most = std::max({most, std::abs(place.x), std::abs(place.y)});
+            }
             farthest.push_back(most);
         }
     }
@@ -111,14 +152,15 @@ public:
         : m_problem(problem),
           m_survival(std::clamp(std::pow(static_cast<double>(largest(problem.albedo)), survival_power),
                                 problem.mean_albedo, max_survival)),
-          m_plans(plans_of(problem, m_survival)),
+          m_groups(groups_of(problem, m_survival)),
+          m_turns(turns_of(problem)),
           m_sublattices(problem.albedo.width, problem.albedo.height, fineness.side,
-                        reach_of(m_plans, fineness.reach_walks, problem.seed)),
+                        reach_of(m_groups, m_turns, fineness.reach_walks, problem.seed)),
           m_albedo(m_sublattices.dealt(problem.albedo, static_cast<float>(1.0 / m_survival), true)),
           m_entering(m_sublattices.dealt(problem.factor, 1.0f, false)),
           m_coverage(problem.coverage.data ? m_sublattices.dealt(problem.coverage, 1.0f, false)
                                            : AlignedVector<float>()),
-          m_shares(irradiances_of(problem), m_sublattices)
+          m_shares(irradiances_of(problem), lights_of(m_groups), m_sublattices)
     {
         for (const TexturedLight& light : problem.lights) {
             m_light.push_back(m_sublattices.dealt(light.irradiance, 1.0f, false));
@@ -144,11 +186,13 @@ public:
             const std::size_t tiled = m_sublattices.tile_count() * tile_texels;
             AlignedVector<float> textured(tiled), plain(tiled);
             std::size_t taken = 0;
-            for (std::size_t i = 0; i < m_plans.size(); ++i) {
-                Random random(m_problem.seed + m_rounds, path_stream, task * m_plans.size() + i);
-                SharedPaths paths;
-                add_paths(paths, m_plans[i], m_shares.most(i, walks), random);
-                taken += add_products(paths, walks, sublattice, i, textured.data(), plain.data());
+            for (std::size_t g = 0; g < m_groups.size(); ++g) {
+                Random random(m_problem.seed + m_rounds, path_stream, task * m_groups.size() + g);
+                const Walks drawn = drawn_walks(m_groups[g].plan, m_shares.drawn(g, walks), random);
+                const std::vector<std::size_t>& lights = m_groups[g].lights;
+                for (std::size_t i = 0; i < lights.size(); ++i)
+                    taken += add_products(drawn, m_shares.start(g, i, walks), walks, sublattice, lights[i],
+                                          textured.data(), plain.data());
             }
             places += taken;
             const std::size_t width = m_problem.albedo.width;
@@ -166,6 +210,13 @@ public:
         });
         const std::size_t tiles = m_sublattices.count() * m_sublattices.tile_count();
         m_products += static_cast<double>(places) * static_cast<double>(texels()) / static_cast<double>(tiles);
+    }
+
+    // Most walks for each texel.
+    double max_walks() const
+    {
+        const double more = std::min(m_shares.walks_at_once(), m_problem.max_more);
+        return more * static_cast<double>(m_problem.max_walks);
     }
 
     // Scatterings of all texels in the walks so far.
@@ -300,30 +351,35 @@ private:
         return sums;
     }
 
-    static std::vector<PathPlan> plans_of(const TexturedProblem& problem, double survival)
-    {
-        std::vector<PathPlan> plans;
-        for (const TexturedLight& light : problem.lights)
-            plans.push_back({problem.medium, light.travel, survival, problem.texels_per_path, problem.is_through});
-        return plans;
-    }
-
-    // Adds the paths of a light, as many of them as belong to each tile of all `walks`; the places that they pass.
-    std::size_t add_products(const SharedPaths& paths, std::size_t walks, std::size_t sublattice, std::size_t light,
-                             float* textured, float* plain) const
+    // Adds the paths of a light, as many of them as belong to each tile of all `walks`; the places that they pass. The light
+    // has the drawn walks from `start` on, and then from the first on.
+    std::size_t add_products(const Walks& drawn, std::size_t start, std::size_t walks, std::size_t sublattice,
+                             std::size_t light, float* textured, float* plain) const
     {
         std::vector<std::ptrdiff_t> places, entries;
         std::vector<std::size_t> first{0}, walk;
         std::vector<float> weights;
-        for (std::size_t p = 0; p < paths.size(); ++p) {
-            const std::size_t begin = paths.first[p], end = paths.first[p + 1];
-            if (!m_sublattices.is_within(paths.places[begin]))
+        const Turn& turn = m_turns[light];
+        const Offsets at_place = m_sublattices.offsets(sublattice, 1);
+        const Offsets at_entry = m_sublattices.offsets(sublattice, m_light_texels[light]);
+        const std::size_t most = m_shares.most(light, walks);
+        const auto first_path =
+            static_cast<std::size_t>(std::ranges::lower_bound(drawn.walk, start) - drawn.walk.begin());
+        for (std::size_t i = 0; i < drawn.size(); ++i) {
+            const std::size_t p = (first_path + i) % drawn.size();
+            const std::size_t number = (drawn.walk[p] + drawn.count - start) % drawn.count;
+            if (number >= most)
+                break;
+            const std::size_t begin = drawn.first[p], end = drawn.first[p + 1];
+            const PathPlace entry = turn(drawn.places[begin], drawn.within[p]);
+            if (!m_sublattices.is_within(entry))
                 continue;  // light enters outside of the plane, or too far to matter
-            entries.push_back(m_sublattices.offset(sublattice, paths.places[begin], m_light_texels[light]));
-            for (std::size_t k = begin; k < end; ++k)
-                places.push_back(m_sublattices.offset(sublattice, paths.places[k]));
+            entries.push_back(at_entry(entry));
+            places.push_back(at_place(entry));
+            for (std::size_t k = begin + 1; k < end; ++k)
+                places.push_back(at_place(turn(drawn.places[k], drawn.within[p])));
             first.push_back(places.size());
-            walk.push_back(paths.walk[p]);
+            walk.push_back(number);
             weights.push_back(
                 static_cast<float>(std::pow(m_problem.mean_albedo / m_survival, static_cast<double>(end - begin - 1))));
         }
@@ -351,7 +407,8 @@ private:
 
     const TexturedProblem& m_problem;
     double m_survival;
-    std::vector<PathPlan> m_plans;
+    std::vector<WalkGroup> m_groups;
+    std::vector<Turn> m_turns;  // [light]
     Sublattices m_sublattices;
     AlignedVector<float> m_albedo;
     AlignedVector<float> m_entering;  // the convention's factor of light that enters
@@ -413,8 +470,8 @@ TexturedError solve_textured(const TexturedProblem& problem, Progress& progress,
             const auto walks = static_cast<double>(result.walks);
             const double excess = std::max(result.error, textured.total_error() / total_part) / problem.tolerance;
             const double wanted = walks * excess * excess;
-            const double affordable = std::min(static_cast<double>(problem.max_walks),
-                                               problem.max_products / std::max(textured.products(), 1.0) * walks);
+            const double affordable =
+                std::min(textured.max_walks(), problem.max_products / std::max(textured.products(), 1.0) * walks);
             const double more =
                 (wanted < affordable ? std::ceil((wanted - walks) / unit) : std::floor((affordable - walks) / unit));
             if (more < 1.0)

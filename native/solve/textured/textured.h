@@ -36,6 +36,7 @@ struct TexturedProblem {
     bool is_through = false;  // light leaves through the far face of a slab
     double tolerance = 0.01;  // wanted error of texels, root mean square, over that of the luminance
     std::size_t max_walks = 4096;  // for each texel
+    double max_more = 1.0;  // largest multiple of them where lights share walks: as many as take the time of one light
     double max_products = 6e9;  // scatterings of all texels; a core does a few 10^9 a second
     std::uint64_t seed = 0;
     int threads = 0;

@@ -16,7 +16,10 @@ namespace {
 constexpr double part_around = 0.1;
 
 // Tiles that follow a walk in the time in which it is drawn. Larger: shares of small planes are more alike.
-constexpr double tiles_for_drawing = 20.0;
+constexpr double tiles_for_drawing = 30.0;
+
+// The same for turning a drawn walk to a light.
+constexpr double tiles_for_turning = 2.0;
 
 // Steps of shares in each octave. More: shares are nearer to the best ones, and more of them are others where last bits of
 // the light are, as from one host to the next.
@@ -24,6 +27,9 @@ constexpr double share_steps = 2.0;
 
 // Time that drawing walks which few tiles follow may add. Larger: less noise for each walk, and longer.
 constexpr double max_added = 0.5;
+
+// The same for walks that lights do not share. Larger: errors of lights differ, so that there are less in sums; longer.
+constexpr double max_apart = 0.25;
 
 std::size_t walks_of(float share, std::size_t all)
 {
@@ -63,8 +69,9 @@ std::vector<double> sums_along(const std::vector<double>& values, std::size_t st
 
 }  // namespace
 
-WalkShares::WalkShares(const std::vector<View2D<const float>>& lights, const Sublattices& sublattices)
-    : m_across(sublattices.tiles_across())
+WalkShares::WalkShares(const std::vector<View2D<const float>>& lights,
+                       const std::vector<std::vector<std::size_t>>& groups, const Sublattices& sublattices)
+    : m_across(sublattices.tiles_across()), m_groups(groups)
 {
     const std::size_t rows = sublattices.side() * tile_rows, columns = sublattices.side() * tile_columns;
     const std::size_t away_down = (sublattices.reach() + rows - 1) / rows;
@@ -108,21 +115,34 @@ void WalkShares::round()
     divide_by(sums);
 }
 
+double WalkShares::most_of(std::size_t light) const
+{
+    return static_cast<double>(*std::ranges::max_element(m_shares[light]));
+}
+
 // Each sublattice draws as many walks of a light as any of its tiles follow: where there are few tiles, most shares come
 // nearer to their means.
 void WalkShares::even_out()
 {
-    double drawn = 0.0;
     std::vector<double> means;
-    for (const std::vector<float>& shares : m_shares) {
-        drawn += *std::ranges::max_element(shares);
+    for (const std::vector<float>& shares : m_shares)
         means.push_back(std::accumulate(shares.begin(), shares.end(), 0.0) / static_cast<double>(shares.size()));
+    double most = 0.0, least = 0.0;
+    for (const std::vector<std::size_t>& group : m_groups) {
+        double most_drawn = 0.0, least_drawn = 0.0;
+        for (const std::size_t light : group) {
+            most += tiles_for_turning * most_of(light);
+            least += tiles_for_turning * means[light];
+            most_drawn = std::max(most_drawn, most_of(light));
+            least_drawn = std::max(least_drawn, means[light]);
+        }
+        most += tiles_for_drawing * most_drawn;
+        least += tiles_for_drawing * least_drawn;
     }
-    const double mean_drawn = std::accumulate(means.begin(), means.end(), 0.0);
-    const double allowed = max_added * static_cast<double>(m_shares.front().size()) / tiles_for_drawing;
-    if (drawn - mean_drawn <= allowed)
+    const double allowed = max_added * static_cast<double>(m_shares.front().size());
+    if (most - least <= allowed)
         return;
-    const double part = allowed / (drawn - mean_drawn);
+    const double part = allowed / (most - least);
     for (std::size_t light = 0; light < m_shares.size(); ++light)
         for (float& share : m_shares[light])
             if (share > 0.0f)
@@ -137,6 +157,40 @@ std::size_t WalkShares::walks(std::size_t light, std::size_t down, std::size_t a
 std::size_t WalkShares::most(std::size_t light, std::size_t all) const
 {
     return walks_of(*std::ranges::max_element(m_shares[light]), all);
+}
+
+double WalkShares::walks_at_once() const
+{
+    constexpr std::size_t many = 1000;
+    double apart = 0.0;
+    for (std::size_t group = 0; group < m_groups.size(); ++group)
+        apart += tiles_for_drawing * static_cast<double>(drawn(group, many)) / static_cast<double>(many);
+    for (std::size_t light = 0; light < m_shares.size(); ++light)
+        apart += tiles_for_turning * most_of(light);
+    const auto tiles = static_cast<double>(m_shares.front().size());
+    return std::max((tiles + tiles_for_drawing + tiles_for_turning) / (tiles + apart), 1.0);
+}
+
+std::size_t WalkShares::drawn(std::size_t group, std::size_t all) const
+{
+    std::size_t largest = 0, sum = 0;
+    for (const std::size_t light : m_groups[group]) {
+        largest = std::max(largest, most(light, all));
+        sum += most(light, all);
+    }
+    return std::clamp(apart(all), largest, sum);
+}
+
+std::size_t WalkShares::start(std::size_t group, std::size_t number, std::size_t all) const
+{
+    return number * apart(all) / m_groups[group].size() % std::max<std::size_t>(drawn(group, all), 1);
+}
+
+// Walks of a group that are drawn even if its lights may share fewer.
+std::size_t WalkShares::apart(std::size_t all) const
+{
+    const double tiles = static_cast<double>(m_shares.front().size()) / static_cast<double>(m_groups.size());
+    return static_cast<std::size_t>(max_apart * tiles / tiles_for_drawing * static_cast<double>(all));
 }
 
 }  // namespace beamspread
