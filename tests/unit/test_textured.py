@@ -7,7 +7,15 @@ from pathlib import Path
 import numpy as np
 import pytest
 from beamspread import LdfSample, Medium, convolve, convolve_lights, library, luminance, presets
-from beamspread.core.bake.directions import ANGLES, MAX_OWN, beams_of
+from beamspread.core.bake.directions import (
+    ANGLES,
+    AZIMUTHS,
+    MAX_OWN,
+    NEAR_ANGLES,
+    NEAR_AZIMUTHS,
+    beams_of,
+    is_near,
+)
 from beamspread.core.native import native
 
 LDF = library(Medium(0.8))
@@ -135,18 +143,29 @@ def test_black_and_nearly_white_side_by_side():
     assert ours[24, 35] > 4 * ours[24, 5]
 
 
-def test_beams_have_all_the_light():
+@pytest.mark.parametrize(("near", "most"), [(False, ANGLES * AZIMUTHS), (True, NEAR_ANGLES * NEAR_AZIMUTHS)])
+def test_beams_have_all_the_light(near, most):
     y, x = (np.mgrid[:48, :40] + 0.5) - 22
     way = np.stack([x, y, np.full_like(x, -10)], -1)
     way = np.float32(way / np.linalg.norm(way, axis=-1, keepdims=True))
     light = np.random.default_rng(1).random((48, 40, 3)).astype(np.float32)
     lights = [(light, way), (2 * light, np.float32(DOWN))]
-    beams = beams_of(lights)
-    assert 1 < len(beams) <= 4 * ANGLES + MAX_OWN
+    beams = beams_of(lights, near)
+    assert most / 2 < len(beams) <= most + MAX_OWN
     np.testing.assert_allclose(sum(part for part, _ in beams), 3 * light, rtol=1e-5)
     for _, direction in beams:
         assert np.linalg.norm(direction) == pytest.approx(1)
         assert direction[2] < 0
+
+
+@pytest.mark.parametrize(("height", "near"), [(5.0, True), (20.0, True), (100.0, False)])
+def test_lamps_are_near_where_directions_change_while_light_spreads(height, near):
+    """Light spreads over four texels here: 20 texels are five such lengths, 100 are 25. A sky is never near."""
+    y, x = (np.mgrid[:48, :40] + 0.5) - 22
+    way = np.stack([x, y, np.full_like(x, -height)], -1)
+    distance = np.linalg.norm(way, axis=-1, keepdims=True)
+    assert is_near([(distance[..., 0] ** -3, way / distance)], (48.0, 40.0), 4.0) == near
+    assert not is_near([(np.ones((48, 40)), np.broadcast_to(DOWN, (48, 40, 3)))], (48.0, 40.0), 4.0)
 
 
 def test_last_bits_of_the_light_change_no_direction():

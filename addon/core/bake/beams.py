@@ -12,7 +12,7 @@ from ..scene.bent_grid import AnyGrid
 from ..scene.illumination import Illumination
 from ..scene.lights import Light, WorldLight
 from .bake_settings import BakeSettings
-from .directions import SURVEY_TEXELS, Beams, Splitter
+from .directions import FAR_LIGHT, NEAR_LIGHT, NEAR_PART, SURVEY_TEXELS, Beams, Splitter, is_near
 from .mean_light import MEAN_WORLD_ROWS
 from .spreading import Effort
 
@@ -24,12 +24,21 @@ PARALLEL = 0.99
 GRAZING = 0.05
 
 
-def arriving_beams(grid: AnyGrid, illumination: Illumination, settings: BakeSettings, effort: Effort) -> Beams:
-    """Light of a few directions on a grid that stands for all lights, at fewer texels where the grid has many."""
+def arriving_beams(
+    grid: AnyGrid, illumination: Illumination, settings: BakeSettings, effort: Effort, spread: float = 0.0
+) -> Beams:
+    """Light of a few directions on a grid that stands for all lights, at fewer texels where the grid has many.
+
+    `spread`: length that light spreads in the medium, in the unit of the grid.
+    """
     lights = lights_before(grid, illumination)
-    surveys = surveyed(grid.coarse(SURVEY_TEXELS), lights, settings, effort)
-    target = grid.gathering(effort.texels)
-    splitter = Splitter.of(surveys, effort.max_own, effort.is_split)
+    coarse = grid.coarse(SURVEY_TEXELS)
+    surveys = surveyed(coarse, lights, settings, effort)
+    shape, size = (-1, coarse.height, coarse.width), (grid.height * grid.pitch_y, grid.width * grid.pitch_x)
+    maps = [(power.reshape(shape), way.reshape(*shape, 3)) for power, way in surveys]
+    near = effort.is_split and is_near(maps, size, spread)
+    target = grid.gathering(effort.texels // NEAR_PART if near else effort.texels)
+    splitter = Splitter.of(surveys, effort.max_own, effort.is_split, NEAR_LIGHT if near else FAR_LIGHT)
     for number, light in enumerate(lights.lights):
         for part, way in rays_of(target, light, lights, settings, effort):
             splitter.add(number, part, way)

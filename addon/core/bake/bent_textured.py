@@ -13,15 +13,14 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from ..material import Material
 from ..progress import Progress
 from ..scene.bent_grid import BentGrid
 from .beams import lights_before, rays_of, surveyed
-from .directions import SURVEY_TEXELS, Splitter
+from .directions import SURVEY_TEXELS, Fineness, Splitter
 from .planes_image import PlanesImage
 from .spreading import Spreading
 from .tangent_planes import CORE, Middle, Points, TangentPlane, middles_of, side_by_side
-from .textured import TexturedPlane
+from .textured import TexturedPlane, spread_length
 
 HALO = 1.5
 """Width around a plane's part of the surface from which light comes, in lengths that light spreads. Larger: longer."""
@@ -55,7 +54,7 @@ def ratio_on_planes(
     effort, settings, material = spreading.effort, spreading.settings, spreading.material
     shown = grid.areas > 0
     target = _target(grid, effort.texels)
-    points, halo = _points(target), HALO * _spread_length(material, spreading.sources)
+    points, halo = _points(target), HALO * spread_length(material.albedo, material.mean_free_path, spreading.sources)
     pitch = grid.pitch_x * float(np.sqrt(grid.texels / len(points)))
     pitch *= float(np.clip(SHARP * min(material.mean_free_path) / pitch, FINEST, 1))
     light = PointsLight(grid, target, spreading)
@@ -109,15 +108,6 @@ def _points(grid: BentGrid) -> Points:
     return Points(*(values.reshape(-1, 3) for values in (grid.middles, grid.normals, grid.tangents)))
 
 
-def _spread_length(material: Material, sources: Sequence) -> float:
-    """Distance that light goes, of the channel where it goes farthest: see `spread_lengths`."""
-    lengths = []
-    for albedo, path, source in zip(material.albedo, material.mean_free_path, sources):
-        transport = path / (1 - albedo * source.medium.g)
-        lengths.append(max(transport, float(np.sqrt(path * transport / (3 * (1 - albedo))))))
-    return max(lengths)
-
-
 def _gap(grid: BentGrid) -> int:
     """Texels between points where texels are long."""
     shown = grid.areas > 0
@@ -161,7 +151,8 @@ class PointsLight:
             turns[nearest == number] = middle.turns(self._survey.at(nearest == number))
         surveys = [(power, _turned(way, np.tile(turns, len(power) // len(turns)))) for power, way in self._surveys]
         effort = self._effort
-        splitter = Splitter.of(surveys, effort.max_own, effort.is_split, MAX_ANGLES, ONE_AZIMUTH, ANGLE_STEP)
+        fineness = Fineness(MAX_ANGLES, ANGLE_STEP, ONE_AZIMUTH)
+        splitter = Splitter.of(surveys, effort.max_own, effort.is_split, fineness)
         for number, light in enumerate(self._lights.lights):
             for part, way in rays_of(self._target, light, self._lights, self._settings, self._effort):
                 power, ways = (values.reshape(-1, 3)[image.points] for values in (part, way))

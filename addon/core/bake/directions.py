@@ -22,13 +22,25 @@ STEP = 14.0
 """Degrees between angles from the normal where there may be more than two. Larger: fewer paths, as above."""
 
 ANGLES = 4
-"""Largest number of angles from the normal, with four azimuths each. More: light goes its own way, and more noise."""
+"""Largest number of angles from the normal. More: light goes its own way, more noise and memory."""
+
+AZIMUTHS = 4
+"""Azimuths where light comes from all around. More: as more angles."""
+
+NEAR_STEP, NEAR_ANGLES, NEAR_AZIMUTHS = 9.0, 6, 12
+"""The same below near lamps, whose directions change along the length that light spreads."""
+
+NEAR = 0.1
+"""That change, radians, from which lamps are near. Larger: fewer paths, and light below lamps that goes another way."""
 
 MAX_OWN = 3
 """Largest number of lights with a direction of their own. More: longer; fewer: suns that share directions."""
 
 STEEP = 6.0
 """Angle from the normal, degrees, up to which azimuths do not count. Larger: fewer paths."""
+
+NEAR_PART = 2
+"""Texels along a side at which light is split over those below near lamps. Larger: less memory, blurred shadows."""
 
 SURVEY_TEXELS = 48
 """Texels along a side at which directions of light are surveyed. More: slower, finer."""
@@ -41,6 +53,27 @@ ANGLE_DIGITS = 1
 
 Beams = list[tuple[NDArray[np.float32], NDArray[np.float64]]]
 """Irradiance (H, W, 3), of any size, and the direction of travel of each."""
+
+
+@dataclass(frozen=True)
+class Fineness:
+    """How finely directions of light are split.
+
+    Attributes
+    ----------
+    angles, step : largest number of angles from the normal, and degrees between them where there may be more than two.
+    one_azimuth : azimuths within this many degrees count as one.
+    azimuths : number of them where light comes from all around.
+    """
+
+    angles: int = ANGLES
+    step: float = STEP
+    one_azimuth: float = NARROW
+    azimuths: int = AZIMUTHS
+
+
+FAR_LIGHT = Fineness()
+NEAR_LIGHT = Fineness(NEAR_ANGLES, NEAR_STEP, azimuths=NEAR_AZIMUTHS)
 
 
 @dataclass(frozen=True)
@@ -63,23 +96,15 @@ class DirectionClasses:
         cls,
         powers: Sequence[NDArray],
         ways: Sequence[NDArray],
-        max_angles: int = ANGLES,
-        one_azimuth: float = NARROW,
-        step: float = STEP,
+        fineness: Fineness = FAR_LIGHT,
     ) -> DirectionClasses:
-        """Classes between which nearly all of the light lies, whose power (N,) and directions (N, 3) are given.
-
-        Parameters
-        ----------
-        one_azimuth : azimuths within this many degrees count as one.
-        step : degrees between angles.
-        """
+        """Classes between which nearly all of the light lies, whose power (N,) and directions (N, 3) are given."""
         power, way = np.concatenate(powers), np.concatenate(ways)
         angle, azimuth = _angles(way)
-        angles = _nodes(angle, power, max_angles, step)
+        angles = _nodes(angle, power, fineness.angles, fineness.step)
         if angles[-1] < STEEP:
             return cls(angles, (0.0,), False)
-        return cls(angles, *_azimuth_nodes(azimuth, power * np.sin(np.radians(angle)), one_azimuth))
+        return cls(angles, *_azimuth_nodes(azimuth, power * np.sin(np.radians(angle)), fineness))
 
     @classmethod
     def mean(cls, powers: Sequence[NDArray], ways: Sequence[NDArray]) -> DirectionClasses:
@@ -99,17 +124,17 @@ class DirectionClasses:
     def weights(self, way: NDArray) -> Iterator[NDArray]:
         """Weights (...) of each class for directions (..., 3); they add up to 1."""
         angle, azimuth = _angles(way)
-        around = [self._around(azimuth, number) for number in range(len(self.azimuths))]
+        around = [self._around(azimuth, number).astype(np.float32) for number in range(len(self.azimuths))]
         for number in range(len(self.angles)):
-            of_angle = _weight(_steepness(angle), _steepness(self.angles), number)
+            of_angle = _weight(_steepness(angle), _steepness(self.angles), number).astype(np.float32)
             for of_azimuth in around:
-                yield (of_angle * of_azimuth).astype(np.float32)
+                yield of_angle * of_azimuth
 
     def _around(self, values: NDArray, number: int) -> NDArray:
         nodes = self.azimuths
         if self.is_whole:
             turn = (values - nodes[number] + 180) % 360 - 180
-            return np.maximum(1 - np.abs(turn) / 90, 0)
+            return np.maximum(1 - np.abs(turn) * (len(nodes) / 360), 0)
         middle = nodes[len(nodes) // 2]
         return _weight((values - middle + 180) % 360 - 180, [node - middle for node in nodes], number)
 
@@ -124,14 +149,31 @@ def direction_of(power: NDArray, way: NDArray) -> NDArray | None:
     return np.round(mean / length, DIGITS) if length > np.cos(np.radians(NARROW)) else None
 
 
-def beams_of(lights: Iterable[tuple[NDArray, NDArray]]) -> Beams:
+def is_near(surveys: Iterable[tuple[NDArray, NDArray]], size: Sequence[float], spread: float) -> bool:
+    """True if lights with these powers (..., H, W) and directions (..., H, W, 3) on a plane are near it.
+
+    `size`: height and width of the plane, `spread`: length that light spreads in its medium, in the same unit.
+    """
+    change = total = 0.0
+    for power, way in surveys:
+        for axis, length in zip((-2, -1), size):
+            between = (np.delete(power, 0, axis) + np.delete(power, -1, axis)) / 2
+            turned = np.linalg.norm(np.diff(way, axis=axis - 1), axis=-1) * (power.shape[axis] / length)
+            change += float((between * turned).sum(dtype=float))
+            total += float(between.sum(dtype=float))
+    return change * spread > NEAR * total
+
+
+def survey_of(light: NDArray, way: NDArray) -> tuple[NDArray, NDArray]:
+    """Powers (H, W) and directions (H, W, 3) at few texels of irradiance (H, W, 3) and directions (3,) or (H, W, 3)."""
+    few = tuple(slice(None, None, max(count // SURVEY_TEXELS, 1)) for count in light.shape[:2])
+    return light[few].sum(-1), np.broadcast_to(way, light.shape)[few]
+
+
+def beams_of(lights: Iterable[tuple[NDArray, NDArray]], near: bool = False) -> Beams:
     """Light of a few directions that stands for all lights: irradiance (H, W, 3), and directions (3,) or (H, W, 3)."""
     lights = list(lights)
-    surveys = []
-    for light, way in lights:
-        few = tuple(slice(None, None, max(size // SURVEY_TEXELS, 1)) for size in light.shape[:2])
-        surveys.append((light[few].sum(-1), np.broadcast_to(way, light.shape)[few]))
-    splitter = Splitter.of(surveys)
+    splitter = Splitter.of([survey_of(*light) for light in lights], fineness=NEAR_LIGHT if near else FAR_LIGHT)
     for number, light in enumerate(lights):
         splitter.add(number, *light)
     return splitter.beams
@@ -156,14 +198,9 @@ class Splitter:
         surveys: Sequence[tuple[NDArray, NDArray]],
         max_own: int = MAX_OWN,
         is_split: bool = True,
-        max_angles: int = ANGLES,
-        one_azimuth: float = NARROW,
-        step: float = STEP,
+        fineness: Fineness = FAR_LIGHT,
     ) -> Splitter:
-        """From powers (...) and directions (..., 3) of each light; not `is_split`: others have their mean one.
-
-        `max_angles`, `one_azimuth`, `step`: as for `DirectionClasses.of`.
-        """
+        """From powers (...) and directions (..., 3) of each light; not `is_split`: others have their mean one."""
         directions = [direction_of(*survey) for survey in surveys]
         narrow = [number for number, way in enumerate(directions) if way is not None]
         narrow.sort(key=lambda number: -float(surveys[number][0].sum()))
@@ -174,7 +211,7 @@ class Splitter:
         powers, ways = [power.ravel() for power, _ in rest], [way.reshape(-1, 3) for _, way in rest]
         if not is_split:
             return cls(own, DirectionClasses.mean(powers, ways))
-        return cls(own, DirectionClasses.of(powers, ways, max_angles, one_azimuth, step))
+        return cls(own, DirectionClasses.of(powers, ways, fineness))
 
     @property
     def beams(self) -> Beams:
@@ -228,16 +265,16 @@ def _quantiles(values: NDArray, weights: NDArray) -> tuple[float, float]:
     return float(low), float(high)
 
 
-def _azimuth_nodes(values: NDArray, weights: NDArray, one_azimuth: float) -> tuple[tuple[float, ...], bool]:
+def _azimuth_nodes(values: NDArray, weights: NDArray, fineness: Fineness) -> tuple[tuple[float, ...], bool]:
     """Azimuths, degrees, ascending; True if they go around."""
     turns = np.exp(1j * np.radians(values))
     middle = float(np.degrees(np.angle((weights * turns).sum())))
     low, high = _quantiles((values - middle + 180) % 360 - 180, weights)
-    if high - low < one_azimuth:
+    if high - low < fineness.one_azimuth:
         return _rounded([middle + (low + high) / 2]), False
     if high - low <= 180:
         return _rounded([middle + low, middle + (low + high) / 2, middle + high]), False
-    return _rounded([middle + turn for turn in (0.0, 90.0, 180.0, 270.0)]), True
+    return _rounded(middle + np.linspace(0, 360, fineness.azimuths, endpoint=False)), True
 
 
 def _rounded(angles: Iterable[float]) -> tuple[float, ...]:

@@ -12,7 +12,7 @@ from ..arrays import float_array
 from ..ldf.reflectance_table import ReflectanceTable, reflectance_table
 from ..native import native
 from ..progress import Progress
-from .directions import Beams, beams_of
+from .directions import NEAR_PART, Beams, beams_of, is_near, survey_of
 
 NOISE = 0.01
 """Wanted root mean square error of texels, relative to that of the luminance. Smaller: longer."""
@@ -24,7 +24,7 @@ SURVIVAL_POWER, LONG_WALK, MOST_SHORT = 1.5, 30.0, 8.0
 """Walks go on with this power of the brightest albedo. Those of fewer scatterings than the second number may be more,
 by up to the third: dark textures return few of them. Larger: less noise there, longer."""
 
-MOST_SHARED = 4.0
+MOST_SHARED = 6.0
 """Most walks of light of many azimuths over those of one, in the same time. Larger: less noise in few texels."""
 
 LEAST_FACTOR = 0.1
@@ -82,7 +82,7 @@ def textured_luminance(
     result = convention(lights, means, solving, factors)
     result *= factors
     plane = TexturedPlane(sources, albedos, factors, means, mean_free_path, pitch)
-    worst = plane.correct(result, beams_of(map(gathered, lights)), side, noise, MAX_WALKS, threads, correcting)
+    worst = plane.correct(result, plane.beams(lights), side, noise, MAX_WALKS, threads, correcting)
     if report_noise:
         report_noise(worst)
     return result
@@ -98,12 +98,21 @@ def checked_map(albedo: ArrayLike, shape: tuple[int, ...]) -> NDArray[np.float32
     return np.ascontiguousarray(np.broadcast_to(values if values.ndim == 3 else values[..., None], shape), np.float32)
 
 
-def gathered(light: tuple[NDArray, NDArray]) -> tuple[NDArray, NDArray]:
-    """Irradiance (H, W, 3) and directions of means of texels, at least `GATHERED_TEXELS` along the longer side."""
+def spread_length(albedo: Sequence[float], mean_free_path: Sequence[float], sources: Sequence) -> float:
+    """Distance that light goes, of the channel where it goes farthest: see `spread_lengths`."""
+    lengths = []
+    for alpha, path, source in zip(albedo, mean_free_path, sources):
+        transport = path / (1 - alpha * source.medium.g)
+        lengths.append(max(transport, float(np.sqrt(path * transport / (3 * (1 - alpha))))))
+    return max(lengths)
+
+
+def gathered(light: tuple[NDArray, NDArray], texels: int = GATHERED_TEXELS) -> tuple[NDArray, NDArray]:
+    """Irradiance (H, W, 3) and directions of means of texels, at least so many along the longer side."""
     irradiance, way = light
     height, width = irradiance.shape[:2]
     for count in (8, 4, 2):
-        if height % count == 0 == width % count and max(height, width) >= count * GATHERED_TEXELS:
+        if height % count == 0 == width % count and max(height, width) >= count * texels:
             irradiance, way = (_means(values, count) if values.ndim == 3 else values for values in light)
             return irradiance, way / np.linalg.norm(way, axis=-1, keepdims=True)
     return light
@@ -179,6 +188,14 @@ class TexturedPlane:
     mean_free_path: Sequence[float]
     pitch: Sequence[float]
     coverage: NDArray[np.float32] | None = None
+
+    def beams(self, lights: Lights) -> Beams:
+        """Light of a few directions that stands for all lights: irradiance (H, W, 3), directions (3,) or (H, W, 3)."""
+        size = [count * step for count, step in zip(self.albedo.shape[:2], self.pitch[::-1])]
+        spread = spread_length(self.mean_albedo, self.mean_free_path, self.sources)
+        near = is_near([survey_of(*light) for light in lights], size, spread)
+        texels = GATHERED_TEXELS // NEAR_PART if near else GATHERED_TEXELS
+        return beams_of([gathered(light, texels) for light in lights], near)
 
     def correct(
         self,

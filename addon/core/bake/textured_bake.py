@@ -19,7 +19,7 @@ from .beams import arriving_beams
 from .bent_textured import ratio_on_planes
 from .directions import Beams
 from .spreading import Spreading
-from .textured import Convention, TexturedPlane, continued
+from .textured import Convention, TexturedPlane, continued, spread_length
 
 # Texels along a side of mirror images in which paths are followed. More: slower; fewer: less light beyond long paths.
 MIRRORED_TEXELS = 128
@@ -95,7 +95,8 @@ def corrected(side: str, grid: AnyGrid, luminance: NDArray, spreading: Spreading
     if isinstance(grid, BentGrid):
         return luminance * ratio_on_planes(side, grid, luminance, spreading, progress)
     effort, settings, material = spreading.effort.of_plane(grid.texels), spreading.settings, spreading.material
-    beams = arriving_beams(grid, spreading.illumination, settings, effort)
+    spread = spread_length(material.albedo, material.mean_free_path, spreading.sources)
+    beams = arriving_beams(grid, spreading.illumination, settings, effort, spread)
     albedo, factor, result, coverage = grid.albedo, grid.color_in, luminance, grid.coverage
     pad = _mirrored_texels(grid)
     if any(pad):
