@@ -8,6 +8,7 @@ import pytest
 import scenes
 from beamspread.blender.images import files, waiting
 from beamspread.blender.images.shared import read_parts, within
+from beamspread.blender.jobs.out_of_date import stale
 from beamspread.blender.jobs.run.bake_run import BakeRun
 from beamspread.blender.jobs.state import Status, state
 from beamspread.core.errors import ImageError
@@ -295,6 +296,11 @@ def test_objects_of_several_materials_get_maps_side_by_side():
 def test_an_object_whose_material_has_an_image_gets_a_map_alone():
     objects = bodies_of_one_material()
     scenes.bake(objects[0])
+    stale.refresh(bpy.context)
+    baked, other = (state.rows[Target(obj.name, "Medium")] for obj in objects[:2])
+    assert (other.status, len(other.messages)) == (Status.NEVER, 1)
+    assert "has no bake of this object, which shows what lies at its UVs" in other.messages[0].text
+    assert other.messages[0] not in baked.messages
     scenes.select(objects[1])
     said = scenes.messages_of(bpy.ops.beamspread.bake)
     assert "lie side by side" not in said + "\n".join(state.lines())

@@ -173,7 +173,7 @@ def _row(target: Target, image, record: Record | None, now: Parts | None) -> Row
     if last is not None and last.status in (Status.FAILED, Status.CANCELLED):
         return replace(last, is_stale=bool(changed))
     if record is None:
-        return Row(target, Status.NEVER)
+        return Row(target, Status.NEVER, tuple(_shown_of_others(target, image)))
     subject, unknown = str(target), () if record.is_comparable() else (note(str(target), *UNKNOWN),)
     earlier = (*_why_later(image), *record.messages(), *unknown)
     if changed and changed != [QUALITY]:
@@ -204,6 +204,14 @@ def _row_of_frames(target: Target, frames: Frames, record: Record | None, now: P
         why = warning(subject, f"{shown} Changed since this frame was baked: {_named(changed, record, now)}.")
         return Row(target, Status.STALE, (why, *warnings))
     return Row(target, Status.WARNED if warnings else Status.BAKED, (note(subject, shown), *warnings))
+
+
+def _shown_of_others(target: Target, image) -> list[Message]:
+    """The note about an object that was never baked, whose material shows an image with bakes of others."""
+    if image is None or all(other.object_name == target.object_name for other in facts_of(image).bakes):
+        return []
+    # Without a subject, so that a panel shows it once for all such objects.
+    return [note("", f"The image '{image.name}' has no bake of this object, which shows what lies at its UVs.")]
 
 
 def _has_lost_its_file(image) -> bool:
