@@ -58,10 +58,13 @@ template <class Vector>
         chosen[i] = values[harmonic[i]];
     lanes.load(chosen.data());
 #else
-    std::array<Indices8, 2> half;
-    std::memcpy(half.data(), harmonic, sizeof(half));
-    const Harmonics8 low = __builtin_shuffle(values, half[0]);
-    const Harmonics8 high = __builtin_shuffle(values, half[1]);
+    // One copy of each half: GCC would copy both by parts, for which the loads of halves would wait.
+    Indices8 first;
+    Indices8 second;
+    std::memcpy(&first, harmonic, sizeof(first));
+    std::memcpy(&second, harmonic + surface_harmonics, sizeof(second));
+    const Harmonics8 low = __builtin_shuffle(values, first);
+    const Harmonics8 high = __builtin_shuffle(values, second);
     if constexpr (Vector::part_count == 1) {
         lanes.parts = {__builtin_shufflevector(low, high, 0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15)};
     } else if constexpr (Vector::part_count == 2) {

@@ -25,9 +25,13 @@ constexpr double max_beyond_ratio = 0.1;
 // up to three times as many. Smaller: more functions, among them some of noise.
 constexpr std::size_t functions_per_curved = 4;
 
+// Number of functions of a set: four vectors. More: at ior 1 up to 1.5 times the time; fewer: larger errors where light
+// grazes small bodies.
+constexpr std::size_t max_functions = 64;
+
 // Number of functions of all sets. They take 2 kB of moments for each sample, those of clusters included. More: smaller
 // errors with colored light at ior 1, more memory.
-constexpr std::size_t max_functions = 3 * 48;
+constexpr std::size_t max_functions_of_all = 3 * 48;
 
 // The LDFs of one curvature as those of a plane, for the decomposition.
 class OneCurvature final : public LdfSource {
@@ -109,7 +113,7 @@ SurfaceBasis::SurfaceBasis(const std::vector<ChannelMedium>& channels, double ma
     const KernelDecomposition kernels(incidence, media, texel);
     std::vector<std::size_t> chosen = kernels.within(tolerance_ratio * tolerance);
     std::erase_if(chosen, [&](std::size_t t) { return kernels.terms()[t].m >= surface_harmonics; });
-    std::size_t most = max_functions / terms.sets.count();
+    std::size_t most = std::min(max_functions, max_functions_of_all / terms.sets.count());
     if (media.size() > terms.sets.media.size()) {
         const KernelDecomposition flat(incidence, terms.sets.media, texel);
         const std::size_t needed = flat.within(tolerance_ratio * tolerance).size();
