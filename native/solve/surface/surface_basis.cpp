@@ -31,7 +31,7 @@ constexpr std::size_t max_functions = 64;
 
 // Number of functions of all sets. They take 2 kB of moments for each sample, those of clusters included. More: smaller
 // errors with colored light at ior 1, more memory.
-constexpr std::size_t max_functions_of_all = 3 * 48;
+constexpr std::size_t max_functions_of_all = 144;
 
 // The LDFs of one curvature as those of a plane, for the decomposition.
 class OneCurvature final : public LdfSource {
