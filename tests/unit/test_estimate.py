@@ -252,12 +252,12 @@ SKY_AND_LAMP = {"broad_rays": 32, "broad_traced": 15, "narrow_rays": 64, "narrow
 @pytest.mark.parametrize(
     ("texels", "pieces", "turning", "path", "ior", "light", "cpu"),
     [
-        (260_600, 1.02, 1.1, 1.0, 1.0, {"lamps": 1}, 4.6),  # hills
-        (260_600, 1.02, 1.1, 4.0, 1.0, {"lamps": 1}, 6.7),
-        (260_600, 1.02, 1.1, 16.0, 1.0, {"lamps": 1}, 13.2),
-        (181_300, 1.55, 3.3, 1.0, 1.0, {"lamps": 1}, 7.9),  # a smooth monkey
-        (181_300, 1.55, 3.3, 4.0, 1.0, {"lamps": 1}, 36.0),
-        (181_300, 1.55, 3.3, 4.0, 1.0, {"broad_rays": 8, "broad_traced": 8}, 46.5),
+        (260_600, 1.02, 1.1, 1.0, 1.0, {"lamps": 1}, 4.4),  # hills
+        (260_600, 1.02, 1.1, 4.0, 1.0, {"lamps": 1}, 5.2),
+        (260_600, 1.02, 1.1, 16.0, 1.0, {"lamps": 1}, 8.2),
+        (181_300, 1.55, 3.3, 1.0, 1.0, {"lamps": 1}, 7.0),  # a smooth monkey
+        (181_300, 1.55, 3.3, 4.0, 1.0, {"lamps": 1}, 22.4),
+        (181_300, 1.55, 3.3, 4.0, 1.0, {"broad_rays": 8, "broad_traced": 8}, 29.3),
         (181_300, 1.55, 3.3, 4.0, 1.5, {"broad_rays": 8, "broad_traced": 8}, 13.5),
         (169_900, 1.49, 1.0, 4.0, 1.5, {"broad_rays": 8, "broad_traced": 8}, 3.3),  # a UV sphere
         (160_400, 1.23, 3.3, 1.1, 1.5, {**SKY_AND_LAMP, "bounced": True}, 10.0),  # another smooth monkey

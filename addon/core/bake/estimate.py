@@ -60,9 +60,9 @@ BENT, BENT_SAMPLE, BENT_CHANNEL = 1.1, 0.6e-6, 2.1e-6
 # surface's turning relative to a ball's, up to this one.
 BENT_PATH, PATH_POWER, TURNING_POWER, MAX_TURNING = 0.3e-6, 1.1, 1.5, 5.0
 # Multiples at an index of 1, where light that leaves depends on more functions: of samples, and of their paths.
-PLAIN_SAMPLE, PLAIN_PATH = 2.7, 5.5
+PLAIN_SAMPLE, PLAIN_PATH = 2.7, 3.1
 # Seconds of a sample for each ray to a light of a size, and of a texel for bounced light.
-BENT_RAY, BENT_BOUNCED = 0.06e-6, 5e-6
+BENT_RAY, BENT_BOUNCED = 0.06e-6, 10e-6
 # On slabs that bend, whose texels are all solved: for each sample, and each channel of its own there, with a mean free
 # path of a texel; the powers of the path and of the turning.
 SLAB_SAMPLE, SLAB_CHANNEL, SLAB_PATH_POWER, SLAB_TURNING_POWER = 4.5e-6, 10.5e-6, 0.55, 0.75
