@@ -20,7 +20,7 @@ constexpr float disk_first_radii = 1.0f;
 
 // Fraction of the tolerance that functions may have where they are left out. Larger: less time for light far away, and
 // larger errors, since those of all distances add up.
-constexpr double block_share = 0.05;
+constexpr double block_share = 0.1;
 
 // Least chord, in radii of a disk, at which curvatures are compared: both profiles are infinite at the pole.
 constexpr double least_chord = 0.1;
