@@ -106,7 +106,9 @@ def test_closed_bodies_look_outward_and_hollows_into_themselves():
 
 @pytest.mark.parametrize("is_hollow", [False, True])
 def test_faces_of_other_materials_tell_which_side_of_a_body_is_outside(is_hollow):
-    """Half of a ball is open, but not with the other half; as the hollow of a larger ball, the same faces stay."""
+    """Half of a ball, whose normals point inward: it is turned where the other half closes the ball, and stays where
+    the ball is the hollow of a larger one.
+    """
     whole = replace(ball(), normals=-ball().normals, corner_normals=-ball().corner_normals)
     half = np.flatnonzero(whole.corners[whole.starts[:-1], 2] > 0)
     part = replace(whole.of_faces(half), whole=joined(whole, ball(radius=2.0)) if is_hollow else whole)

@@ -21,7 +21,7 @@ struct WalkPlan {
     bool is_through = false;  // walks leave through the far face of a slab
 };
 
-// Walks that leave through the face that counts: the entry, then each scattering.
+// Walks that leave through the face of interest. Places of a walk: its entry, then its scatterings.
 struct Walks {
     std::vector<Vec2> places;  // seen from the exit, mean free paths
     std::vector<Vec2> within;  // [path], the point of its texel that light leaves, in [0, 1)
@@ -32,7 +32,7 @@ struct Walks {
     std::size_t size() const { return walk.size(); }
 };
 
-// This many walks.
+// Draws `count` walks.
 Walks drawn_walks(const WalkPlan& plan, std::size_t count, Random& random);
 
 // Offset of a texel from the texel that light leaves.
@@ -48,7 +48,7 @@ struct Turn {
 
     PathPlace operator()(const Vec2& place, const Vec2& within) const;
 
-    Vec2 right;  // what mean free paths along x and y of a walk add to x, texels
+    Vec2 right;  // texels along x for a mean free path along x and along y of a walk
     Vec2 up;
 };
 

@@ -18,7 +18,7 @@ constexpr double part_around = 0.1;
 // Tiles that follow a walk in the time in which it is drawn. Larger: shares of small planes are more alike.
 constexpr double tiles_for_drawing = 30.0;
 
-// The same for turning a drawn walk to a light.
+// Tiles that follow a walk in the time in which a drawn walk is turned to a light.
 constexpr double tiles_for_turning = 2.0;
 
 // Steps of shares in each octave. More: shares are nearer to the best ones, and more of them are others where last bits of
@@ -28,7 +28,8 @@ constexpr double share_steps = 2.0;
 // Time that drawing walks which few tiles follow may add. Larger: less noise for each walk, and longer.
 constexpr double max_added = 0.5;
 
-// The same for walks that lights do not share. Larger: errors of lights differ, so that there are less in sums; longer.
+// Time that walks may add which lights of a group do not share. Larger: errors of lights differ more, so that more of them
+// cancel; longer.
 constexpr double max_apart = 0.25;
 
 std::size_t walks_of(float share, std::size_t all)

@@ -25,7 +25,7 @@ public:
     // in some time allows.
     std::size_t drawn(std::size_t group, std::size_t all) const;
 
-    // First of them for the light that is this one of its group. It hardly depends on the light.
+    // Index of the first drawn walk that a light takes; `number`: of the light in its group.
     std::size_t start(std::size_t group, std::size_t number, std::size_t all) const;
 
     // Walks that take the time of one of light of a single direction; at least 1.
