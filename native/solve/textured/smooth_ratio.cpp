@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstdint>
 #include <numeric>
 #include <span>
 
@@ -27,6 +26,10 @@ constexpr std::size_t block_side = 4;
 
 // Standard deviation of the Gaussian that averages the errors of blocks before they choose, blocks. As above.
 constexpr double choice_width = 2.0;
+
+// Widths share a block if the least cost is less by up to this fraction of the noise without smoothing, so that last bits
+// of the light never change a width. Larger: blocks that are smoothed too little or too much.
+constexpr float tie = 0.05f;
 
 // Blocks along a side of the regions whose mean errors are estimated. Larger: less noise of these; smaller: errors of few
 // texels next to others count as they are.
@@ -197,6 +200,22 @@ std::vector<Errors> errors_at(const PathSums& sums, std::size_t width, const Sca
     return result;
 }
 
+// Weights of widths in a block whose best one is known.
+std::array<float, widths.size()> weights_of(const std::vector<Errors>& errors, std::size_t block, std::size_t best)
+{
+    std::array<float, widths.size()> weights{};
+    const float least = errors[best].cost[block], range = tie * errors[0].variance[block];
+    float sum = 0.0f;
+    for (std::size_t k = 0; k < widths.size(); ++k) {
+        const float more = errors[k].cost[block] - least;
+        weights[k] = k == best ? 1.0f : more < range ? 1.0f - more / range : 0.0f;
+        sum += weights[k];
+    }
+    for (float& weight : weights)
+        weight /= sum;
+    return weights;
+}
+
 // Weight of the right one of two neighbors at a texel, and the left one, along one axis.
 struct Between {
     std::size_t left;
@@ -218,7 +237,7 @@ SmoothingChoice choose_smoothing(const PathSums& sums, std::size_t width, const 
 {
     const Blocks blocks(width, sums.plain[0].size() / width);
     const std::vector<Errors> errors = errors_at(sums, width, scale, widths);
-    SmoothingChoice result{std::vector<std::uint8_t>(blocks.count()), 0.0};
+    SmoothingChoice result{{widths.size(), Map(blocks.count())}, 0.0};
     const std::size_t regions = (blocks.width + region_side - 1) / region_side;
     std::vector<double> costs((blocks.height + region_side - 1) / region_side * regions), variances(costs.size());
     double power = 0.0;
@@ -227,7 +246,9 @@ SmoothingChoice choose_smoothing(const PathSums& sums, std::size_t width, const 
         for (std::size_t k = 1; k < widths.size(); ++k)
             if (errors[k].cost[b] < errors[best].cost[b])
                 best = k;
-        result.width[b] = static_cast<std::uint8_t>(best);
+        const std::array<float, widths.size()> weights = weights_of(errors, b, best);
+        for (std::size_t k = 0; k < widths.size(); ++k)
+            result.weights[k][b] = weights[k];
         const std::size_t region = b / blocks.width / region_side * regions + b % blocks.width / region_side;
         costs[region] += static_cast<double>(errors[best].cost[b]);
         variances[region] += static_cast<double>(errors[best].variance[b]);
@@ -259,34 +280,32 @@ void smooth_ratio(PathSums sums, std::size_t width, const SmoothingChoice& choic
     for (std::size_t x = 0; x < width; ++x)
         columns.push_back(between_blocks(x, blocks.width));
     parallel_for(blocks.height, [&](std::size_t block_row) {
-        std::array<Map, widths.size()> ratios;
-        Map textured(width), plain(width), ratio(width);
+        Map textured(width), plain(width), ratio(width), sum(width);
         const Map one(width, 1.0f);
         const std::size_t end = std::min((block_row + 1) * block_side, height);
         for (std::size_t y = block_row * block_side; y < end; ++y) {
             const Between up = between_blocks(y, blocks.height);
-            const std::uint8_t* const below = choice.width.data() + up.left * blocks.width;
-            const std::uint8_t* const above = choice.width.data() + up.right * blocks.width;
+            std::ranges::fill(sum, 0.0f);
             for (std::size_t k = 0; k < widths.size(); ++k) {
-                const auto is_k = [&](std::uint8_t chosen) { return chosen == k; };
-                if (std::none_of(below, below + blocks.width, is_k) && std::none_of(above, above + blocks.width, is_k))
+                const std::span<const float> weights(choice.weights[k]);
+                const std::span<const float> below = weights.subspan(up.left * blocks.width, blocks.width);
+                const std::span<const float> above = weights.subspan(up.right * blocks.width, blocks.width);
+                const auto is_used = [](float weight) { return weight > 0.0f; };
+                if (std::ranges::none_of(below, is_used) && std::ranges::none_of(above, is_used))
                     continue;
                 RowSmoother smoother(gaussians[k], width, height);
                 smoother(sums.textured[0].data(), y, textured.data());
                 smoother(sums.plain[0].data(), y, plain.data());
-                ratios[k].resize(width);
-                divide_rows(ratios[k].data(), textured.data(), plain.data(), one.data(), width);
+                divide_rows(ratio.data(), textured.data(), plain.data(), one.data(), width);
+                for (std::size_t x = 0; x < width; ++x) {
+                    const Between& across = columns[x];
+                    const float weight =
+                        std::lerp(std::lerp(below[across.left], below[across.right], across.weight),
+                                  std::lerp(above[across.left], above[across.right], across.weight), up.weight);
+                    sum[x] += weight * ratio[x];
+                }
             }
-            for (std::size_t x = 0; x < width; ++x) {
-                const Between& across = columns[x];
-                const auto at = [&](const std::uint8_t* blocks_of_row, std::size_t column) {
-                    return ratios[blocks_of_row[column]][x];
-                };
-                ratio[x] =
-                    std::lerp(std::lerp(at(below, across.left), at(below, across.right), across.weight),
-                              std::lerp(at(above, across.left), at(above, across.right), across.weight), up.weight);
-            }
-            take(y, ratio.data());
+            take(y, sum.data());
         }
     });
 }

@@ -3,7 +3,6 @@
 
 #include <array>
 #include <cstddef>
-#include <cstdint>
 #include <functional>
 #include <vector>
 
@@ -18,9 +17,9 @@ struct PathSums {
 // Writes a row of the factors that a ratio is multiplied by later, in whose units errors count.
 using ScaleRow = std::function<void(std::size_t y, float* values)>;
 
-// Gaussians by which the ratio of the sums is smoothed, one for each block of texels, and the error that they leave.
+// Gaussians by which the ratio of the sums is smoothed in each block of texels, and the error that they leave.
 struct SmoothingChoice {
-    std::vector<std::uint8_t> width;  // [block], index of a width
+    std::vector<std::vector<float>> weights;  // [width][block]; those of a block add up to 1
     double error = 0.0;  // estimated root mean square of ratio x scale, over the root mean square of that
 };
 
