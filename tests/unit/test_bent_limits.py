@@ -60,9 +60,26 @@ def test_loose_parts_that_exchange_light_are_named(gap, is_named):
     assert ["2 loose parts of 'Tubes'" in text for text in texts] == [True] * is_named
 
 
-def test_parts_that_touch_are_no_loose_parts():
+def one_tube():
     tube = two_tubes(0.05)
-    alone = replace(
+    return replace(
         tube, corners=tube.corners[:96], uvs=tube.uvs[:96], starts=tube.starts[:25], normals=tube.normals[:24]
     )
-    assert flatten(alone, 0.01, "Tube", spread=0.1).messages == ()
+
+
+def test_parts_that_touch_are_no_loose_parts():
+    assert flatten(one_tube(), 0.01, "Tube", spread=0.1).messages == ()
+
+
+def test_faces_without_an_area_are_no_loose_parts():
+    """A bevel of no width leaves some at corners, each with all of its points in one place."""
+    tube = one_tube()
+    points, uvs = np.repeat(tube.corners[:2], 4, axis=0), np.repeat(tube.uvs[:2], 4, axis=0)
+    bevelled = replace(
+        tube,
+        corners=np.concatenate([tube.corners, points]),
+        uvs=np.concatenate([tube.uvs, uvs]),
+        starts=4 * np.arange(27),
+        normals=np.concatenate([tube.normals, np.zeros((2, 3))]),
+    )
+    assert flatten(bevelled, 0.01, "Tube", spread=0.1).messages == ()

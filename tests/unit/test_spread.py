@@ -11,6 +11,8 @@ from beamspread.core.bake.spread import (
     MAX_SIDE,
     MIN_SIDE,
     Spread,
+    diffuse_notes,
+    extent,
     image_length,
     side_for,
     spread_lengths,
@@ -93,6 +95,8 @@ def test_length_of_an_image_by_areas():
     assert image_length([polygons]) == pytest.approx(4.0)
     assert image_length([replace(polygons, uvs=None)]) == pytest.approx(math.sqrt(8 / 0.6))
     assert image_length([replace(polygons, uvs=10 * polygons.uvs)]) == pytest.approx(math.sqrt(8 / 0.6))
+    lost = np.concatenate([polygons.uvs[:4], polygons.uvs[4:] * (1, 1e-14)])
+    assert image_length([replace(polygons, uvs=lost)]) == pytest.approx(math.sqrt(8 / 0.6))
 
 
 def test_a_diffuse_bake_is_named_with_a_side_that_shows_the_spread():
@@ -106,6 +110,20 @@ def test_a_diffuse_bake_is_named_with_a_side_that_shows_the_spread():
     better = Spread.of(9.0, Surface(MARBLE), (spread.better_side,) * 2)
     assert better.texels >= 2
     assert better.messages("Wall") == []
+
+
+def test_materials_of_an_object_have_one_note():
+    surface, size = Surface(MARBLE), (1024, 1024)
+    spreads = [Spread.of(length, surface, size) for length in (9.0, 20.0, 1e3, 1.0)]
+    (message,) = diffuse_notes("Room", spreads)
+    assert str(message) == (
+        "The light inside 'Room' spreads over at most 0.97 texels, so this is a diffuse bake. "
+        "Choose a Resolution of 8192, and Resize the image if there is one."
+    )
+    assert diffuse_notes("Room", spreads[3:]) == []
+    assert extent(spreads[:2]) == "0.44 to 0.97 texels"
+    assert extent(spreads[2:3]) == "less than 0.01 texels"
+    assert extent(spreads[3:]) == "8.7 texels"
 
 
 def test_no_side_is_offered_where_none_helps():

@@ -12,7 +12,7 @@ from ...core.bake.bake_settings import COMBINED, FINAL, PREVIEW, BakeSettings
 from ...core.bake.estimate import OF_MESHES, OF_WORLD
 from ...core.bake.forecast import Finders, Forecast, seconds_of
 from ...core.bake.pace import Estimate
-from ...core.bake.spread import Spread
+from ...core.bake.spread import Spread, diffuse_notes, extent
 from ...core.bake.surroundings import Surroundings, enclosed_part
 from ...core.errors import MaterialError
 from ...core.scene.lights import Light, WorldLight
@@ -289,29 +289,27 @@ def simulation_line(announced: dict[Target, Announced], targets: Iterable[Target
 def spread_lines(announced: dict[Target, Announced], targets: Iterable[Target]) -> list[str]:
     """How far light spreads in the images of targets, in texels; bakes in which it spreads less than a texel apart.
 
-    Both sides of a sheet have one line.
+    All materials of an object, and both sides of a sheet, have one line.
     """
-    spreads = {target: announced[target].spread for target in targets if target in announced}
-    shown = [spread for spread in spreads.values() if spread is not None and not spread.is_diffuse]
+    shown: list[Spread] = []
+    diffuse: dict[str, list[Spread]] = {}
+    for target in targets:
+        spread = announced[target].spread if target in announced else None
+        if spread is not None:
+            (diffuse.setdefault(target.object_name, []) if spread.is_diffuse else shown).append(spread)
     lines = [f"The light spreads over {_extent(shown)}"] if shown else []
-    diffuse = {target: spread for target, spread in spreads.items() if spread is not None and spread.is_diffuse}
-    lines += [str(message) for target, spread in diffuse.items() for message in spread.messages(target.object_name)]
-    return list(dict.fromkeys(lines))[:MAX_LINES]
+    lines += [str(message) for name, spreads in diffuse.items() for message in diffuse_notes(name, spreads)]
+    return lines[:MAX_LINES]
 
 
 def _extent(spreads: list[Spread]) -> str:
     """Least to most texels over which light spreads. Numbers beyond the size of an image would tell nothing."""
-    # Two digits, without exponent.
-    texels = [
-        f"{float(f'{spread.texels:.2g}'):,.10g}"
-        for spread in sorted(spreads, key=lambda spread: spread.texels)
-        if not spread.is_wide
-    ]
-    if not texels:
+    inside = [spread for spread in spreads if not spread.is_wide]
+    if not inside:
         return "the whole surface"
-    if len(texels) < len(spreads):
-        return f"{texels[0]} texels and more"
-    return f"{texels[0] if texels[0] == texels[-1] else f'{texels[0]} to {texels[-1]}'} texels"
+    if len(inside) < len(spreads):
+        return f"{extent([min(inside, key=lambda spread: spread.texels)])} and more"
+    return extent(inside)
 
 
 def _total(chosen: list[Announced]) -> float:

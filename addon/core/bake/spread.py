@@ -12,6 +12,7 @@ from ..ldf.reflectance_table import exact_table
 from ..material import MAX_ALBEDO
 from ..messages import Message, note
 from ..scene.flat_mesh import FlatMesh
+from ..scene.islands import MAX_LOST, NO_UV_AREA
 from ..scene.polygons import Polygons
 from .surface import MIRROR, Surface, channel_media
 
@@ -30,6 +31,9 @@ TEXELS_PER_TRANSPORT = 3.0
 
 # Texels along the longer side, at most, that are offered where a medium spreads light less than a texel.
 MAX_OFFERED = 8192
+
+# Texels below which panels name no number. Less: more digits that tell nothing.
+LEAST_NAMED = 0.01
 
 # Part of an image that a new UV map fills, about. Larger: coarser new images.
 FILLED = 0.6
@@ -72,15 +76,19 @@ def spread_over_edges(surface: Surface) -> float:
 def image_length(meshes: Iterable[Polygons]) -> float:
     """Length that the side of a square image has on the surface, scene units, by the areas of faces and of their UVs.
 
-    A map that does not fit into one image will be replaced by one that fills `FILLED` of it.
+    A map that does not fit into one image, or has faces without an area, will be replaced by one that fills `FILLED`
+    of the image.
     """
-    area = uv_area = 0.0
+    area = uv_area = lost = 0.0
     images: set[int] = set()
     for polygons in meshes:
         area += float(polygons.areas.sum())
-        uv_area += 0.0 if polygons.uvs is None else float(polygons.uv_areas.sum())
+        if polygons.uvs is not None:
+            uv_area += float(polygons.uv_areas.sum())
+            lost += float(polygons.areas[polygons.uv_areas <= NO_UV_AREA].sum())
         images |= {0} if polygons.tiles is None else set(np.unique(polygons.tiles).tolist())
-    return math.sqrt(area / (uv_area if 0 < uv_area <= len(images) else FILLED))
+    is_kept = 0 < uv_area <= len(images) and lost <= MAX_LOST * area
+    return math.sqrt(area / (uv_area if is_kept else FILLED))
 
 
 def length_of(mesh: FlatMesh) -> float:
@@ -173,14 +181,28 @@ class Spread:
         wanted = self.side * TEXELS_PER_PATH / self.texels
         return _power_of_two(wanted) if self.is_diffuse and wanted <= MAX_OFFERED else None
 
-    def _remedy(self) -> str:
-        if self.better_side is None:
-            return f"Even {MAX_OFFERED} texels along the longer side would hardly show more."
-        return f"Choose a Resolution of {self.better_side}, and Resize the image if there is one."
-
     def messages(self, name: str) -> list[Message]:
         """The note about the object `name` whose bake is a diffuse one."""
-        if not self.is_diffuse:
-            return []
-        text = f"The light inside '{name}' spreads over {self.texels:.2g} texels, so this is a diffuse bake."
-        return [note(name, text, self._remedy())]
+        return diffuse_notes(name, [self])
+
+
+def extent(spreads: Iterable[Spread]) -> str:
+    """Least to most texels over which light spreads, by two digits: "0.12 to 3.4 texels"."""
+    texels = sorted(spread.texels for spread in spreads)
+    # Two digits, without exponent.
+    least, most = (f"{float(f'{value:.2g}'):,.10g}" for value in (texels[0], texels[-1]))
+    if texels[0] < LEAST_NAMED:
+        return f"at most {most} texels" if texels[-1] >= LEAST_NAMED else f"less than {LEAST_NAMED} texels"
+    return f"{least if least == most else f'{least} to {most}'} texels"
+
+
+def diffuse_notes(name: str, spreads: Iterable[Spread]) -> list[Message]:
+    """The note about images of the object `name` in which light spreads less than a texel; none if there are none."""
+    diffuse = [spread for spread in spreads if spread.is_diffuse]
+    if not diffuse:
+        return []
+    text = f"The light inside '{name}' spreads over {extent(diffuse)}, so this is a diffuse bake."
+    sides = [spread.better_side for spread in diffuse if spread.better_side is not None]
+    if not sides:
+        return [note(name, text, f"Even {MAX_OFFERED} texels along the longer side would hardly show more.")]
+    return [note(name, text, f"Choose a Resolution of {max(sides)}, and Resize the image if there is one.")]

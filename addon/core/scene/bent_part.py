@@ -180,6 +180,8 @@ def _loose_parts(polygons: Polygons, body_of: np.ndarray, spread: float, name: s
     """The note about parts without a common edge that are so near to each other that light crosses between them."""
     areas = np.bincount(body_of, polygons.areas)
     largest = np.argsort(-areas, kind="stable")[:MAX_LOOSE_PARTS]
+    # Bevels of no width leave faces without an area, which are no part of anything.
+    largest = largest[areas[largest] > NO_AREA_BESIDE * polygons.areas.max()]
     if spread == 0 or len(largest) < 2:
         return []
     place = np.full(len(areas), -1)
