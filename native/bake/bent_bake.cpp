@@ -216,7 +216,7 @@ BentShares bake_bent(const Surface& surface, const std::vector<const SurfaceLigh
     const SurfaceProblem problem{.samples = samples.all,
                                  .steps = samples.steps,
                                  .neighbors = samples.neighbors,
-                                 .whole_areas = samples.whole_areas,
+                                 .uneven_sides = samples.uneven_sides,
                                  .channels = channels,
                                  .tolerance = options.tolerance,
                                  .is_colored = is_colored(surface, lights),

@@ -26,6 +26,9 @@ constexpr float least_normal_cosine = 0.99f;
 // Coverage from which on a texel counts as whole.
 constexpr float least_whole_coverage = 0.999f;
 
+// Largest ratio of the areas of texels side by side on an even lattice.
+constexpr float most_growth = 1.08f;
+
 // Coverage that smaller ones count as: rounding decides about their areas.
 constexpr float least_coverage = 1e-5f;
 
@@ -173,7 +176,24 @@ BentSamples::Part BentSamples::part_of(const Surface& surface, std::size_t texel
         part.area += other.area;
     }
     part.position /= static_cast<double>(part.area);
+    part.is_uneven = is_uneven(surface, texel, count);
     return part;
+}
+
+bool BentSamples::is_uneven(const Surface& surface, std::size_t first, std::size_t count)
+{
+    const ReceiverGrid& grid = surface.grid;
+    const auto goes_on = [&](std::size_t a, std::size_t b, Vec3f BentTexel::* step) {
+        const auto [smaller, larger] = std::minmax(grid.bent_texel(a).area, grid.bent_texel(b).area);
+        return is_whole(surface, a) && is_whole(surface, b) && larger < most_growth * smaller &&
+               are_neighbors(grid.bent_texel(a), grid.bent_texel(b), step);
+    };
+    const std::size_t last = first + count - 1;
+    const std::size_t middle = first + count / 2;
+    return !(first % grid.width > 0 && goes_on(first - 1, first, &BentTexel::step_x) && (last + 1) % grid.width > 0 &&
+             goes_on(last, last + 1, &BentTexel::step_x) && middle >= grid.width &&
+             goes_on(middle - grid.width, middle, &BentTexel::step_y) && middle + grid.width < grid.texels() &&
+             goes_on(middle, middle + grid.width, &BentTexel::step_y));
 }
 
 void BentSamples::add(const ReceiverGrid& grid, std::size_t texel, const Part& part, double mean_free_path)
@@ -199,7 +219,7 @@ void BentSamples::add(const ReceiverGrid& grid, std::size_t texel, const Part& p
         all.push_back({Vec3f(part.position + at * along - origin), Vec3f(normal), Vec3f(glm::normalize(tangent)),
                        part.area / static_cast<float>(pieces)});
         steps.push_back({Vec3f(across), Vec3f(along / static_cast<double>(pieces))});
-        whole_areas.push_back(all.back().area / std::max(part.coverage, least_coverage));
+        uneven_sides.push_back(part.is_uneven ? std::sqrt(part.area / std::max(part.coverage, least_coverage)) : 0.0f);
     }
 }
 

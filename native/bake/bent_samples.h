@@ -48,7 +48,7 @@ struct BentSamples {
     std::vector<SurfaceSample> all;
     std::vector<SampleSteps> steps;
     std::vector<SampleNeighbors> neighbors;
-    std::vector<float> whole_areas;
+    std::vector<float> uneven_sides;
     std::vector<Range> of_texel;
     std::vector<Run> runs;
     std::vector<std::uint32_t> run;  // [texel] number of its run from 1 on, 0: none; empty: no texel has one
@@ -59,9 +59,12 @@ private:
         Vec3 position{0.0}, normal{0.0}, tangent{0.0}, step_x{0.0}, step_y{0.0};
         float area = 0.0f;
         float coverage = 1.0f;
+        bool is_uneven = false;
     };
 
     void find_runs(const Surface& surface);
+    // True unless texels in a row, and those beside, are whole, of about the same size, and without a sharp edge between.
+    static bool is_uneven(const Surface& surface, std::size_t first, std::size_t count);
     Part part_of(const Surface& surface, std::size_t texel) const;
     void add(const ReceiverGrid& grid, std::size_t texel, const Part& part, double mean_free_path);
     void find_neighbors(const ReceiverGrid& grid);

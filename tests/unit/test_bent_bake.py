@@ -5,7 +5,7 @@ import pytest
 from beamspread import Cancelled, Medium, library
 from beamspread.core.native import native
 
-from bent_shapes import ball, cut_texels, flat, from_points, texels_of, unit
+from bent_shapes import ball, cube, cut_texels, flat, from_points, texels_of, unit
 from shapes import FACES, SQUARE, make_grid, occluders
 
 FRAME = np.eye(3)
@@ -68,13 +68,13 @@ def test_long_texels_have_the_light_of_their_area(stretch, path, media):
     np.testing.assert_allclose(bent, plane, rtol=5e-3)
 
 
-@pytest.mark.parametrize(("path", "tolerance"), [(0.01, 0.09), (0.002, 0.12)])
+@pytest.mark.parametrize("path", [0.01, 0.004, 0.002])
 @pytest.mark.parametrize("turn", [0, 0.2, 0.7])
-def test_texels_that_a_seam_cuts_have_the_light_of_whole_ones(turn, path, tolerance, media):
+def test_texels_that_a_seam_cuts_have_the_light_of_whole_ones(turn, path, media):
     """Texels of .05 on both sides of a seam on a flat mesh, whose islands lie in any way on the texels, under a sun.
 
-    Disks stand for parts of texels: 8 and 11 % measured for parts of a tenth and more, 2 and 3 % on average. As
-    disks of whole texels' shape, they are up to 26 and 37 % too bright.
+    1.7 % measured, by light of odd harmonics and the tolerance of the solver. With the own light of disks parts
+    of texels are up to 25 % too bright.
     """
     half = np.array([(0, 0), (1, 0), (1, 1), (0, 1)]) * (0.6, 1.2)
     turned = np.array([(np.cos(turn), np.sin(turn)), (-np.sin(turn), np.cos(turn))])
@@ -88,10 +88,44 @@ def test_texels_that_a_seam_cuts_have_the_light_of_whole_ones(turn, path, tolera
     luminance = baked(native.Surface(texels.native(), coverage.astype(np.float32)), lights, thin, tolerance=1e-3)
     x, y = texels.positions[..., 0], texels.positions[..., 1]
     beside = (np.abs(x - 0.6) < 0.1) & (np.abs(y - 0.6) < 0.3)
-    cut, whole = (beside & (coverage >= low) & (coverage < high) for low, high in ((0.1, 0.99), (0.99, 1.1)))
+    cut, whole = (beside & (coverage >= low) & (coverage < high) for low, high in ((0.01, 0.99), (0.99, 1.1)))
     assert cut.sum() > 10
     assert whole.sum() > 10
-    np.testing.assert_allclose(luminance[cut] / luminance[whole].mean(0), 1, atol=tolerance)
+    np.testing.assert_allclose(luminance[cut | whole] / luminance[whole].mean(0), 1, atol=0.02)
+
+
+@pytest.mark.parametrize("path", [0.02, 0.004])
+def test_light_is_even_where_the_size_of_texels_changes(path, media):
+    """A flat mesh of strips whose texels are 1.7 times as wide as those beside, some across two strips, under a sun.
+
+    .5 % measured, by light of odd harmonics and the solver's tolerance; 2.7 % with the own light of an even lattice.
+    """
+    ends = np.concatenate([[0], np.cumsum(np.where(np.arange(12) % 2, 1, 1.7))]) / 5.4
+    columns = np.linspace(0.03, 0.97, 13)
+    square = np.array([(0, 0), (1, 0), (1, 1), (0, 1)])
+    points = [np.stack([ends[i + square[:, 0]], 3.0 * square[:, 1], 0.0 * square[:, 1]], -1) for i in range(12)]
+    uvs = np.concatenate([np.stack([columns[i + square[:, 0]], 0.03 + 0.94 * square[:, 1]], -1) for i in range(12)])
+    triangles = np.concatenate([np.array([(0, 1, 2), (0, 2, 3)]) + 4 * i for i in range(12)])
+    mesh = from_points(np.concatenate(points), triangles, uvs[triangles], False, False)
+    texels, coverage = cut_texels(mesh, 64)
+    lights, thin = [(native.SunLight((0.5, 0.2, -0.6), 0.0), WHITE, None)], {**media, "mean_free_path": [path] * 3}
+    surface = native.Surface(texels.native(), coverage.astype(np.float32))
+    luminance = baked(surface, lights, thin, tolerance=1e-3)[20:44, 12:52]
+    np.testing.assert_allclose(luminance, np.broadcast_to(np.median(luminance, (0, 1)), luminance.shape), rtol=8e-3)
+
+
+def test_no_edge_of_a_cube_in_an_even_world_is_brighter_than_the_world():
+    """A cube of texels of .07 in light of 1 from everywhere: no point of it can return more than falls on it.
+
+    .91 measured; 1.05 if parts of texels have the own light of disks.
+    """
+    mesh = cube()
+    texels, coverage = cut_texels(mesh, 96)
+    world = native.EnvironmentLight(np.ones((2, 4, 3), np.float32), np.eye(3))
+    media = {"ldf": [library(Medium(0.8, 1.0))] * 3, "albedo": [0.999, 0.99, 0.9], "mean_free_path": [0.002] * 3}
+    surface = native.Surface(texels.native(), coverage.astype(np.float32))
+    luminance = baked(surface, [(world, WHITE, mesh.occluders())], media, rays=1024)
+    assert luminance[coverage > 0.01].max() <= 1
 
 
 def test_areas_count_and_coverage_does_not(media):

@@ -138,11 +138,11 @@ def test_a_shade_with_a_bulb_shines_evenly(ldf):
     shade = job.run()
     inside = shade.receiver.inside()
     wanted = ldf.transmittance(0, ALBEDO) * irradiance / math.pi
-    np.testing.assert_allclose(shade.texture[inside].mean(axis=0), wanted, rtol=0.015)  # .9 % measured
-    # Texels at the poles are long and cut, and unscattered light has sharp edges: 11 % in a sixteenth of all texels.
+    np.testing.assert_allclose(shade.texture[inside].mean(axis=0), wanted, rtol=3e-3)  # .14 % measured
+    # Texels at the poles are long and cut: 3.5 % at most, 2.4 % in one of a hundred, .6 % in one of ten.
     off = np.abs(shade.texture[inside][:, 0] / wanted[0] - 1)
-    assert np.quantile(off, 0.9) < 0.07
-    assert off.max() < 0.12
+    assert np.quantile(off, 0.9) < 0.01
+    assert off.max() < 0.05
     lit = mesh_job(smooth_ball(), [lamp(0.0, 0.0, 0.0)], side=BACK).run().texture[inside].mean(axis=0)
     np.testing.assert_allclose(lit, ldf.reflectance(0, ALBEDO) * irradiance / math.pi, rtol=0.015)  # 1 % measured
     dark = mesh_job(smooth_ball(), [lamp(0.0, 0.0, 0.0)], surface=Surface(MATERIAL)).run()

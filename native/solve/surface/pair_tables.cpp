@@ -39,6 +39,8 @@ PairTables::PairTables(SurfaceKernels& kernels, const SampleAreas& areas)
         disks.push_back(kernels.disk(number));
     point = kernels.point(static_cast<int>(std::floor(std::log2(first_radius))));
     make_self(basis, radius_of(areas.least), radius_of(areas.most));
+    if (areas.most_uneven > 0.0f)
+        make_within(basis, areas.most_uneven);
 }
 
 void PairTables::make_scales(const SurfaceBasis& basis)
@@ -87,6 +89,26 @@ void PairTables::make_self(const SurfaceBasis& basis, float min_radius, float ma
                 m_self.values[lanes.group(r)][row * lanes.lanes() + lanes.lane(r, f)] =
                     static_cast<float>(2.0 * pi * within);
             }
+        });
+    }
+}
+
+void PairTables::make_within(const SurfaceBasis& basis, float most_uneven)
+{
+    m_within.first = chord_step(least_ring * disks.front()->radius);
+    m_within.rows =
+        std::max(chord_step(near_sides * most_uneven), m_within.first) - m_within.first + steps_per_ring + 1;
+    m_within.values.resize(lanes.groups, AlignedVector<float>(m_within.rows * lanes.lanes(), 0.0f));
+    for (std::size_t r = 0; r < lanes.results; ++r) {
+        const std::vector<ScaledProfile>& profiles = profiles_of(basis, r, flat_index(basis, r));
+        parallel_for(m_within.rows, [&](std::size_t row) {
+            const auto radius = static_cast<double>(chord_of(m_within.first + static_cast<std::uint32_t>(row)));
+            std::vector<Harmonics> within;
+            for (const ScaledProfile& scaled : profiles)
+                within.push_back(scaled.profile.cumulative(radius / scaled.mean_free_path));
+            for (std::size_t f = 0; f < basis.functions(); ++f)
+                m_within.values[lanes.group(r)][row * lanes.lanes() + lanes.lane(r, f)] =
+                    static_cast<float>(within[basis.rank[f]][static_cast<std::size_t>(basis.harmonic[f])]);
         });
     }
 }
@@ -164,6 +186,36 @@ void PairTables::add_self_light(float area, float neighbors, const LatticeShape&
                 const float own = within[lane] + part * (within[count + lane] - within[lane]);
                 product[k] = (own - cosine[k] * turn.x + mirrored * sine[k] * turn.y) * light[k] -
                              (cosine[k] * turn.y + mirrored * sine[k] * turn.x) * light[lanes_per_block + k];
+            }
+            lanes.add(group, product.data(), sums);
+        }
+    }
+}
+
+void PairTables::add_uneven_light(const UnevenRings& rings, const float* moments, float* sums) const
+{
+    const std::size_t count = lanes.lanes();
+    for (std::size_t group = 0; group < lanes.groups; ++group) {
+        const float* first = m_within.values[group].data() + (rings.first - m_within.first) * count;
+        const float* of_set = moments + lanes.set[group] * 2 * count;
+        for (std::size_t b = 0; b < lanes.blocks; ++b) {
+            std::array<float, lanes_per_block> cosine{}, sine{}, product{};
+            for (std::size_t k = 0; k < lanes_per_block; ++k) {
+                const std::size_t lane = b * lanes_per_block + k;
+                const auto m = static_cast<std::size_t>(lanes.harmonic[lane]);
+                if (m >= uneven_harmonics)
+                    continue;
+                const float* within = first + lane;
+                if (m == 0)
+                    cosine[k] = static_cast<float>(2.0 * pi) * *within;
+                for (const RingIntegrals& left : rings.left) {
+                    const float ring = within[steps_per_ring * count] - *within;
+                    cosine[k] += left[2 * m] * ring;
+                    sine[k] += left[2 * m + 1] * ring;
+                    within += steps_per_ring * count;
+                }
+                const float* light = of_set + b * 2 * lanes_per_block + k;
+                product[k] = cosine[k] * light[0] + sine[k] * light[lanes_per_block];
             }
             lanes.add(group, product.data(), sums);
         }

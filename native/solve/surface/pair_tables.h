@@ -10,6 +10,7 @@
 #include "solve/surface/chord_table.h"
 #include "solve/surface/lattice_excess.h"
 #include "solve/surface/surface_kernels.h"
+#include "solve/surface/uneven_sample.h"
 
 namespace beamspread {
 
@@ -34,6 +35,7 @@ struct SampleAreas {
     float least = 0.0f;
     float most = 0.0f;
     float mean = 0.0f;
+    float most_uneven = 0.0f;  // longest side of the texel of an uneven sample, metres
 };
 
 // Kernels of a surface. A sample's light comes from a disk of its area, which keeps the energy for any ratio of the
@@ -50,6 +52,10 @@ public:
     void add_self_light(float area, float neighbors, const LatticeShape& lattice, const float* moments,
                         float* sums) const;
 
+    // The same of a sample whose neighbors are no lattice. Its rings begin at `first_ring` or later.
+    void add_uneven_light(const UnevenRings& rings, const float* moments, float* sums) const;
+    std::uint32_t first_ring() const { return m_within.first; }
+
     // Bounds on the second derivatives of the first function, [row of the point], 1 / m^4. They don't grow with the chord.
     std::vector<double> second_derivatives(std::size_t result) const;
 
@@ -64,10 +70,12 @@ public:
 private:
     void make_scales(const SurfaceBasis& basis);
     void make_self(const SurfaceBasis& basis, float min_radius, float max_radius);
+    void make_within(const SurfaceBasis& basis, float most_uneven);
     double place_of(float radius) const;
 
     double m_disk_step = 1.0;  // between disks, octaves of the radius
     ChordTable m_self;  // light within a sample's disk, over its radius; one curvature
+    ChordTable m_within;  // the same of one direction, for rings around uneven samples
 };
 
 }  // namespace beamspread

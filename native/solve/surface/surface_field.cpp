@@ -36,9 +36,6 @@ constexpr std::size_t even_probes = 40;
 // Size over distance of clusters with which the largest luminance is found.
 constexpr float probing_size = 0.3f;
 
-// Area of a cut sample's own light over that of the whole sample, at least. Larger: the smallest parts are brighter.
-constexpr float least_own = 0.15f;
-
 // Largest difference of the squared length of a unit vector from 1, and of the cosine of two vectors from 0.
 constexpr float unit_tolerance = 2e-3f;
 
@@ -93,14 +90,16 @@ void check_memory(std::size_t bytes, std::size_t limit)
     throw MemoryLimit(text.str());
 }
 
-SampleAreas areas_of(std::span<const SurfaceSample> samples)
+SampleAreas areas_of(const SurfaceProblem& problem)
 {
+    const std::span<const SurfaceSample> samples = problem.samples;
     const auto [least, most] = std::minmax_element(
         samples.begin(), samples.end(), [](const SurfaceSample& a, const SurfaceSample& b) { return a.area < b.area; });
     double sum = 0.0;
     for (const SurfaceSample& sample : samples)
         sum += static_cast<double>(sample.area);
-    return {least->area, most->area, static_cast<float>(sum / static_cast<double>(samples.size()))};
+    const float most_uneven = problem.uneven_sides.empty() ? 0.0f : std::ranges::max(problem.uneven_sides);
+    return {least->area, most->area, static_cast<float>(sum / static_cast<double>(samples.size())), most_uneven};
 }
 
 // A length near to another one, of which kernels are made: surfaces of about the same texels share them.
@@ -115,7 +114,7 @@ std::shared_ptr<SurfaceKernels> checked_kernels(const SurfaceProblem& problem)
     with_threads(problem.threads, [&] {
         check(problem);
         kernels = SurfaceKernels::recent({problem.channels, problem.max_angle_deg,
-                                          rounded(std::sqrt(static_cast<double>(areas_of(problem.samples).mean))),
+                                          rounded(std::sqrt(static_cast<double>(areas_of(problem).mean))),
                                           problem.is_colored, problem.tolerance});
     });
     return kernels;
@@ -139,7 +138,7 @@ std::vector<SurfaceTree::Group> probed(std::vector<SurfaceTree::Group> groups)
 PairTables tables_of(const SurfaceProblem& problem, SurfaceKernels& kernels)
 {
     std::vector<PairTables> tables;
-    with_threads(problem.threads, [&] { tables.emplace_back(kernels, areas_of(problem.samples)); });
+    with_threads(problem.threads, [&] { tables.emplace_back(kernels, areas_of(problem)); });
     return std::move(tables.front());
 }
 
@@ -354,24 +353,16 @@ std::size_t SurfaceField::solve_group(const SurfaceTree::Group& group, const Sur
         Exitance exitance{{}, beyond[k]};
         std::copy_n(sums.begin() + static_cast<std::ptrdiff_t>(k * max_results), max_results, exitance.sums.begin());
         if (m_tree.is_lit(targets.own[k]))
-            add_self(targets.own[k], exitance.sums);
+            add_self(targets.own[k], sources, exitance.sums);
         store_exitance(targets.own[k], exitance);
     }
     return targets.count * sources.count();
 }
 
-// The surface goes on beyond the edge of a cut sample. Where light spreads less than a sample, that of its neighbors does
-// not reach its middle, and its own stands for all.
-float SurfaceField::own_area(std::size_t sample) const
-{
-    const float area = m_problem.samples[sample].area;
-    return m_problem.whole_areas.empty() ? area : std::max(area, least_own * m_problem.whole_areas[sample]);
-}
-
 // Mean index of the disks of a sample's neighbors: where areas change, some neighbors have the next larger disk.
 float SurfaceField::neighbor_disk(std::size_t sample) const
 {
-    const auto disk_of = [&](std::size_t i) { return static_cast<float>(m_tables.disk(own_area(i))); };
+    const auto disk_of = [&](std::size_t i) { return static_cast<float>(m_tables.disk(m_problem.samples[i].area)); };
     if (m_problem.neighbors.empty())
         return disk_of(sample);
     float sum = 0.0f;
@@ -392,10 +383,31 @@ LatticeShape SurfaceField::lattice(std::size_t sample) const
     return {in_frame(m_problem.steps[sample].x), in_frame(m_problem.steps[sample].y)};
 }
 
-void SurfaceField::add_self(std::size_t sample, std::array<float, 3>& sums) const
+UnevenRings SurfaceField::uneven_rings(std::size_t sample, SurfaceTree::Sources& sources) const
 {
-    m_tables.add_self_light(own_area(sample), neighbor_disk(sample), lattice(sample),
-                            m_moments.data() + sample * m_basis.lanes.moments(), sums.data());
+    const auto& [position, normal, tangent, area] = m_problem.samples[sample];
+    const SampleSteps& steps = m_problem.steps[sample];
+    const UnevenSample own{position, normal, tangent, steps.x, steps.y, m_problem.uneven_sides[sample]};
+    m_tree.find_near(position, near_sides * own.side, sources);
+    std::vector<NearSample> near;
+    for (const PairSource* other : sources.near) {
+        if (other->moments == sample)
+            continue;
+        const SampleSteps& of_other = m_problem.steps[other->moments];
+        near.push_back({other->position, other->normal, of_other.x, of_other.y, m_problem.samples[other->moments].area,
+                        m_tables.disks[other->disk]->radius});
+    }
+    return rings_around(own, m_tables.first_ring(), near);
+}
+
+void SurfaceField::add_self(std::size_t sample, SurfaceTree::Sources& sources, std::array<float, 3>& sums) const
+{
+    const float* moments = m_moments.data() + sample * m_basis.lanes.moments();
+    if (!m_problem.uneven_sides.empty() && m_problem.uneven_sides[sample] > 0.0f)
+        m_tables.add_uneven_light(uneven_rings(sample, sources), moments, sums.data());
+    else
+        m_tables.add_self_light(m_problem.samples[sample].area, neighbor_disk(sample), lattice(sample), moments,
+                                sums.data());
 }
 
 void SurfaceField::store(std::size_t sample, const Exitance& exitance, float* luminance)

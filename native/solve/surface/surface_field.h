@@ -20,6 +20,7 @@
 #include "solve/surface/surface_basis.h"
 #include "solve/surface/surface_kernels.h"
 #include "solve/surface/surface_tree.h"
+#include "solve/surface/uneven_sample.h"
 
 namespace beamspread {
 
@@ -35,14 +36,15 @@ struct SurfaceProblem {
     std::span<const SurfaceSample> samples;
     std::span<const SampleSteps> steps{};  // [sample]; empty: unknown
     std::span<const SampleNeighbors> neighbors{};  // [sample]; empty: all are as large as the sample
-    std::span<const float> whole_areas{};  // [sample] m^2, without the edge that cuts it; empty: none is cut
+    // [sample] sides of the texels of samples whose neighbors are no even lattice, metres; 0: they are; empty: all are.
+    std::span<const float> uneven_sides{};
     std::vector<ChannelMedium> channels;  // at most 3
-    double tolerance = 1e-3;              // largest error of a luminance against all pairs, relative to the largest
-    double max_angle_deg = 90.0;          // light comes at up to this angle from the normal
-    bool is_colored = false;              // true if channels of all light together are not proportional
-    int threads = 0;                      // 0: all
-    std::size_t max_moment_bytes = 0;     // bytes of moments of the light; 0: any
-    bool is_direct = false;               // true: all pairs one by one, the truth
+    double tolerance = 1e-3;  // largest error of a luminance against all pairs, relative to the largest
+    double max_angle_deg = 90.0;  // light comes at up to this angle from the normal
+    bool is_colored = false;  // true if channels of all light together are not proportional
+    int threads = 0;  // 0: all
+    std::size_t max_moment_bytes = 0;  // bytes of moments of the light; 0: any
+    bool is_direct = false;  // true: all pairs one by one, the truth
 };
 
 class SurfaceField {
@@ -96,7 +98,7 @@ private:
         BeamMoments moments;
         BeamRow beams;
         std::vector<float> irradiance;  // [set][beam]
-        std::vector<float> values;      // [term][beam]
+        std::vector<float> values;  // [term][beam]
     };
 
     // Light of pairs at a sample, [result], and its part by pairs that bend more than the tables.
@@ -109,10 +111,10 @@ private:
     std::size_t solve_group(const SurfaceTree::Group& group, const SurfaceTree::Opening& opening,
                             SurfaceTree::Sources& sources,
                             const std::function<void(std::size_t, const Exitance&)>& store_exitance) const;
-    float own_area(std::size_t sample) const;
     float neighbor_disk(std::size_t sample) const;
     LatticeShape lattice(std::size_t sample) const;
-    void add_self(std::size_t sample, std::array<float, 3>& sums) const;
+    void add_self(std::size_t sample, SurfaceTree::Sources& sources, std::array<float, 3>& sums) const;
+    UnevenRings uneven_rings(std::size_t sample, SurfaceTree::Sources& sources) const;
     void store(std::size_t sample, const Exitance& exitance, float* luminance);
     double luminance_of(const ChannelSets::Member& member, float exitance) const;
     void set_color(const std::vector<double>& color);
@@ -123,7 +125,7 @@ private:
     PairTables m_tables;
     SurfaceTree m_tree;
     std::vector<float> m_moments;  // [sample], then [node of the tree], as in `SurfaceBasis`
-    std::vector<double> m_color;   // of all light, if channels are proportional
+    std::vector<double> m_color;  // of all light, if channels are proportional
     std::mutex m_color_lock;
     PerThread<Scratch> m_scratch;
     PerThread<SurfaceTree::Sources> m_sources;

@@ -79,8 +79,8 @@ SurfaceTree::Group SurfaceTree::group_of(std::span<const std::uint32_t> samples,
 std::size_t SurfaceTree::Sources::count() const
 {
     std::size_t sum = clusters.size();
-    for (const std::span<const PairSource> near : samples)
-        sum += near.size();
+    for (const std::span<const PairSource> part : samples)
+        sum += part.size();
     return sum;
 }
 
@@ -174,6 +174,27 @@ void SurfaceTree::find(const Group& group, const Opening& opening, float reach, 
             sources.waiting.push_back(node.second);
             sources.waiting.push_back(number + 1);
         }
+    }
+}
+
+void SurfaceTree::find_near(const Vec3f& place, float distance, Sources& sources) const
+{
+    sources.near.clear();
+    sources.waiting.assign(1, 0);
+    while (!sources.waiting.empty()) {
+        const std::uint32_t number = sources.waiting.back();
+        sources.waiting.pop_back();
+        const Node& node = m_nodes[number];
+        if (node.weight == 0.0f || glm::length(node.middle - place) > node.radius + distance)
+            continue;
+        if (node.second != 0) {
+            sources.waiting.push_back(node.second);
+            sources.waiting.push_back(number + 1);
+            continue;
+        }
+        for (const PairSource& sample : lit_samples(node))
+            if (glm::length(sample.position - place) < distance)
+                sources.near.push_back(&sample);
     }
 }
 

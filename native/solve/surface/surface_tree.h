@@ -73,6 +73,7 @@ public:
 
         std::vector<const ClusterSource*> shared;  // clusters that are far from all groups side by side
         std::vector<std::uint32_t> candidates;     // nodes that may be sources of some of these
+        std::vector<const PairSource*> near;       // lit samples around a place: see `find_near`
         std::vector<std::uint32_t> waiting;        // working memory
     };
 
@@ -91,6 +92,9 @@ public:
 
     // Finds the sources of one of these groups.
     void find(const Group& group, const Opening& opening, float reach, Sources& sources) const;
+
+    // Finds the lit samples within a distance (metres) of a place.
+    void find_near(const Vec3f& place, float distance, Sources& sources) const;
 
 private:
     // One line of the cache.
