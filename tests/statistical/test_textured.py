@@ -43,6 +43,7 @@ CASES = {
     "checker of 4": (checker(0.7, 0.99, 4), np.ones((SIDE, SIDE)), (0.0, 0.0, -1.0), 1.0, 0.05),
     "checker of 8, to black": (checker(0.0, 0.95, 8), np.ones((SIDE, SIDE)), (0.0, 0.0, -1.0), 0.5, 0.05),
     "veins, lamp": (veins(), *lamp_above(8.0), 1.0, 0.02),
+    "veins, low lamp in half of a shadow": (veins(), half_lit() * lamp_above(6.0)[0], lamp_above(6.0)[1], 1.0, 0.02),
     "checker of 4, low lamp": (checker(0.7, 0.99, 4), *lamp_above(5.0), 1.0, 0.05),
     "checker of 8, low lamp": (checker(0.7, 0.99, 8), *lamp_above(5.0), 1.0, 0.05),
 }

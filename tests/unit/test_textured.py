@@ -1,5 +1,6 @@
 """`convolve` with an albedo of each texel."""
 
+import math
 import subprocess
 import sys
 from pathlib import Path
@@ -158,6 +159,19 @@ def test_beams_have_all_the_light(near, most):
         assert direction[2] < 0
 
 
+def test_azimuths_are_as_dense_in_half_of_the_light():
+    """Below a near lamp they are 30 degrees apart, also where half of its light is in a shadow."""
+    y, x = (np.mgrid[:48, :40] + 0.5) - 22
+    way = np.stack([x, y, np.full_like(x, -10)], -1)
+    light = np.broadcast_to(np.float32(x > 0)[..., None], (48, 40, 3))
+    beams = beams_of([(light, np.float32(way / np.linalg.norm(way, axis=-1, keepdims=True)))], near=True)
+    azimuths = np.unique([np.degrees(np.arctan2(y, x)).round(1) for _, (x, y, _) in beams])
+    assert np.ptp(azimuths) > 120
+    # Half of a step between 2.5 steps and 3.
+    assert np.diff(azimuths).max() < 36
+    np.testing.assert_allclose(sum(part for part, _ in beams), light, rtol=1e-5)
+
+
 @pytest.mark.parametrize(("height", "near"), [(5.0, True), (20.0, True), (100.0, False)])
 def test_lamps_are_near_where_directions_change_while_light_spreads(height, near):
     """Light spreads over four texels here: 20 texels are five such lengths, 100 are 25. A sky is never near."""
@@ -218,6 +232,21 @@ def test_lights_share_the_walks():
         return found
 
     assert 0.6 < error(8) / error(1) < 1.6
+
+
+def test_lights_count_by_what_enters():
+    """Light from above on bright stripes and light at 85 degrees, of which .4 enters, on dark ones: they leave the dark
+    stripes as if each shone alone. Bound: 5 %, of which noise is 2; 18 % off where both lights count alike.
+    """
+    rows = np.arange(48)[:, None] // 4 % 2 * np.ones((48, 40))
+    slanted = (0.0, math.sin(math.radians(85)), -math.cos(math.radians(85)))
+    lights = [(rows, DOWN), (1 - rows, slanted)]
+
+    def dark(*lights):
+        result = convolve_lights(lights, library(Medium(0.8, 1.5)), np.where(rows, 0.95, 0.3), 1.0, 1.0)
+        return result[..., 0][8:-8][rows[8:-8] == 0].mean(dtype=float)
+
+    assert dark(*lights) == pytest.approx(sum(map(dark, lights)), rel=0.05)
 
 
 def test_lights_of_one_angle_turn_the_same_walks():

@@ -63,7 +63,7 @@ class Fineness:
     ----------
     angles, step : largest number of angles from the normal, and degrees between them where there may be more than two.
     one_azimuth : azimuths within this many degrees count as one.
-    azimuths : number of them where light comes from all around.
+    azimuths : number of them where light comes from all around; elsewhere they are as dense, and at least three.
     """
 
     angles: int = ANGLES
@@ -135,7 +135,7 @@ class DirectionClasses:
         if self.is_whole:
             turn = (values - nodes[number] + 180) % 360 - 180
             return np.maximum(1 - np.abs(turn) * (len(nodes) / 360), 0)
-        middle = nodes[len(nodes) // 2]
+        middle = (nodes[0] + nodes[-1]) / 2
         return _weight((values - middle + 180) % 360 - 180, [node - middle for node in nodes], number)
 
 
@@ -273,7 +273,8 @@ def _azimuth_nodes(values: NDArray, weights: NDArray, fineness: Fineness) -> tup
     if high - low < fineness.one_azimuth:
         return _rounded([middle + (low + high) / 2]), False
     if high - low <= 180:
-        return _rounded([middle + low, middle + (low + high) / 2, middle + high]), False
+        count = max(round((high - low) * fineness.azimuths / 360) + 1, 3)
+        return _rounded(middle + np.linspace(low, high, count)), False
     return _rounded(middle + np.linspace(0, 360, fineness.azimuths, endpoint=False)), True
 
 

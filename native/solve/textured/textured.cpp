@@ -163,7 +163,8 @@ public:
           m_shares(irradiances_of(problem), lights_of(m_groups), m_sublattices)
     {
         for (const TexturedLight& light : problem.lights) {
-            m_light.push_back(m_sublattices.dealt(light.irradiance, 1.0f, false));
+            const auto entering = static_cast<float>(1.0 - fresnel(-light.travel.z, problem.medium.ior));
+            m_light.push_back(m_sublattices.dealt(light.irradiance, entering, false));
             m_light_texels.push_back(m_sublattices.texels_of(light.irradiance));
         }
         for (std::size_t h = 0; h < 2; ++h) {
