@@ -115,14 +115,16 @@ void BentSolution::mark_changes(std::size_t step, const Light& light, Mask& is_r
     std::vector<float> near(m_grid.texels() * results);
     std::vector<float> all(near.size());
     for (std::size_t r = 0; r < results; ++r) {
-        const std::vector<float> of_step = light.field.factors_within(static_cast<double>(step) * m_grid.pitch_x, r);
-        const std::vector<float> of_all = light.field.factors_within(std::numeric_limits<double>::max(), r);
+        const std::vector<SurfaceField::Weight> of_step =
+            light.field.weights_within(static_cast<double>(step) * m_grid.pitch_x, r);
+        const std::vector<SurfaceField::Weight> of_all =
+            light.field.weights_within(std::numeric_limits<double>::max(), r);
         parallel_for(m_grid.height, [&](std::size_t y) {
             for (std::size_t i = y * m_grid.width; i < (y + 1) * m_grid.width; ++i) {
                 if (!m_texels->is_whole(i))
                     continue;
-                near[i * results + r] = light.field.exitance_within(of_step, m_samples.of_texel[i].begin, r);
-                all[i * results + r] = light.field.exitance_within(of_all, m_samples.of_texel[i].begin, r);
+                near[i * results + r] = light.field.exitance_within(of_step, m_samples.of_texel[i].begin);
+                all[i * results + r] = light.field.exitance_within(of_all, m_samples.of_texel[i].begin);
             }
         });
     }

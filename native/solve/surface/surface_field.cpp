@@ -435,26 +435,30 @@ std::vector<float> SurfaceField::brightest() const
     return luminance;
 }
 
-std::vector<float> SurfaceField::factors_within(double radius, std::size_t result) const
+std::vector<SurfaceField::Weight> SurfaceField::weights_within(double radius, std::size_t result) const
 {
-    std::vector<float> factors(m_basis.functions());
+    std::vector<Weight> weights;
+    if (!(m_brightest[result] > 0.0f))
+        return weights;
     const std::vector<ScaledProfile>& profiles = profiles_of(m_basis, result, flat_index(m_basis, result));
-    for (std::size_t f = 0; f < factors.size(); ++f) {
+    for (std::size_t f = 0; f < m_basis.functions(); ++f) {
         const ScaledProfile& scaled = profiles[m_basis.rank[f]];
         // Other harmonics cancel around a sample.
-        if (m_basis.harmonic[f] == 0 && m_brightest[result] > 0.0f)
-            factors[f] = static_cast<float>(2.0 * pi * scaled.profile.cumulative(radius / scaled.mean_free_path)[0]) /
-                         m_brightest[result];
+        if (m_basis.harmonic[f] == 0)
+            weights.push_back(
+                {m_basis.lanes.place(result, f),
+                 static_cast<float>(2.0 * pi * scaled.profile.cumulative(radius / scaled.mean_free_path)[0]) /
+                     m_brightest[result]});
     }
-    return factors;
+    return weights;
 }
 
-float SurfaceField::exitance_within(std::span<const float> factors, std::size_t sample, std::size_t result) const
+float SurfaceField::exitance_within(std::span<const Weight> weights, std::size_t sample) const
 {
     const float* moments = m_moments.data() + sample * m_basis.lanes.moments();
     float sum = 0.0f;
-    for (std::size_t f = 0; f < factors.size(); ++f)
-        sum += factors[f] * moments[m_basis.lanes.place(result, f)];
+    for (const Weight& each : weights)
+        sum += each.weight * moments[each.moment];
     return sum;
 }
 

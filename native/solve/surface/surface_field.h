@@ -71,10 +71,16 @@ public:
     // The following are known after `gather`. Results are channels, or media that channels share.
     std::size_t results() const { return m_tables.lanes.results; }
 
+    // Weights of some of a sample's moments.
+    struct Weight {
+        std::size_t moment;
+        float weight;
+    };
+
     // Radiant exitance over the largest one, if the same light as at a sample enters around it up to a radius (metres) and
-    // nowhere else: [function] factors of a result for `exitance_within`.
-    std::vector<float> factors_within(double radius, std::size_t result) const;
-    float exitance_within(std::span<const float> factors, std::size_t sample, std::size_t result) const;
+    // nowhere else: weights of a result for `exitance_within`.
+    std::vector<Weight> weights_within(double radius, std::size_t result) const;
+    float exitance_within(std::span<const Weight> weights, std::size_t sample) const;
 
     // Largest luminance of each channel, about.
     std::vector<float> brightest() const;
