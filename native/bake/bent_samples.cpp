@@ -237,8 +237,13 @@ void BentSamples::find_neighbors(const ReceiverGrid& grid)
                                                    (last + 1) % grid.width > 0 ? last + 1 : i,
                                                    middle >= grid.width ? middle - grid.width : i,
                                                    middle + grid.width < grid.texels() ? middle + grid.width : i};
+        // Where texels have other numbers of pieces, their disks are no lattice.
+        const bool is_even = std::ranges::all_of(
+            beside, [&](std::size_t n) { return of_texel[n].count == 0 || of_texel[n].count == of_texel[i].count; });
         for (std::uint32_t k = 0; k < of_texel[i].count; ++k) {
             const std::uint32_t sample = of_texel[i].begin + k;
+            if (!is_even && uneven_sides[sample] == 0.0f)
+                uneven_sides[sample] = std::sqrt(all[sample].area * static_cast<float>(of_texel[i].count));
             for (std::size_t n = 0; n < beside.size(); ++n) {
                 const Range& other = of_texel[beside[n]];
                 neighbors[sample][n] = other.count == 0 ? sample : other.begin + std::min(k, other.count - 1);
