@@ -135,15 +135,18 @@ class TangentPlane:
 
     @classmethod
     def of(cls, middle: Middle, points: Points, pitch: float, halo: float) -> TangentPlane:
-        """The plane with texels of a pitch, and with the surface up to a distance around its part."""
+        """The plane with texels of a pitch, and with the surface up to a distance around its part.
+
+        Beyond the surface's border the plane goes on as far: paths meet no other plane there.
+        """
         apart = points.positions - middle.position
         length = np.sqrt(_dot(apart, apart))
         reach = length[middle.distances(points) < BLEND].max(initial=0.0) + halo
         chosen = np.flatnonzero((length <= reach) & (_dot(points.normals, middle.normal) > FACING))
         shown = points.at(chosen)
         places, mismatch = _places(middle, shown, pitch)
-        low = np.floor(places.min(axis=0)) - 1
-        size = np.ceil(places.max(axis=0)) + 2 - low
+        low = np.floor(np.maximum(places.min(axis=0) - halo / pitch, -reach / pitch)) - 1
+        size = np.ceil(np.minimum(places.max(axis=0) + halo / pitch, reach / pitch)) + 2 - low
         weights = np.float32((pitch / (pitch + mismatch)) ** MISMATCH_POWER)
         facts = tuple(size.astype(int).tolist()), chosen, places - low, weights, middle.turns(shown)
         return cls(middle, pitch, low, *facts)
