@@ -150,7 +150,10 @@ def add_arch(radius, width=SIDE):
 
 
 def test_light_scatters_in_textures_of_meshes_that_bend():
-    """A strip that bends by 38 degrees is as a plane on which the light turns, within the noise of both."""
+    """A strip that bends by 38 degrees, over the same of one color, is as a plane on which the light turns.
+
+    Within the noise of both, 2 and 1 %, and that of small texels; columns up to the open ends have means of 48 texels.
+    """
     bpy.context.scene.beamspread.resolution = SIZE
     bpy.context.scene.beamspread.margin = 0
     add_sun(ANGLE)
@@ -166,8 +169,16 @@ def test_light_scatters_in_textures_of_meshes_that_bend():
     angle = turn + np.radians(ANGLE)
     way = np.stack([np.sin(angle), 0 * angle, -np.cos(angle)], -1) * np.ones((SIZE, 1, 1))
     truth = luminance(-way[..., 2], way, medium, PATH, albedo=albedo)
+    notes = state.lines()
+    # A bent strip is brighter than a plane, whatever its colors.
+    material.node_tree.links.remove(node_of(material).inputs["Base Color"].links[0])
+    node_of(material).base_color = np.mean(COLORS, axis=0)
+    even = replace(medium, albedo=tuple(albedo_from_color(np.mean(COLORS, axis=0), Medium(G, IOR))))
+    truth *= bake(obj)[0] / luminance(-way[..., 2], way, even, PATH)
     assert distance(found, truth) < 0.05
-    assert not any("multiplies light" in line or "baked as flat" in line for line in state.lines())
+    assert distance(found.mean(axis=0), truth.mean(axis=0)) < 0.01
+    assert np.abs(found.mean(axis=0) / truth.mean(axis=0) - 1).max() < 0.03
+    assert not any("multiplies light" in line or "baked as flat" in line for line in notes)
 
 
 def test_a_mesh_that_bends_has_its_texture_in_tiles(tmp_path):
