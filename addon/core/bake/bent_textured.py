@@ -43,6 +43,9 @@ MAX_RATIO = 4
 ONE_AZIMUTH = 90.0
 """Degrees within which azimuths count as one: planes turn with the light. Larger: less noise, and light that turns."""
 
+MOST_LIGHT = 2.0
+"""Most light that leaves a texel, over that of the brightest color everywhere. Larger: brighter faults of few paths."""
+
 MIN_GAP, MAX_GAP = 2, 8
 """Texels between points of a surface that stretched texels show. More: gaps in surfaces are lit."""
 
@@ -76,9 +79,11 @@ def ratio_on_planes(
     if spreading.reports.texture:
         spreading.reports.texture(noise * scale)
     ratio = np.divide(result, convention, out=np.ones_like(result), where=convention > 0)
-    # Light under the surface is smoother than the factors, which are as sharp as the texels.
+    # Light under the surface is smoother than the factors, which are as sharp as the texels. It can hardly exceed that
+    # of the brightest color everywhere: few paths end in the dark, and their ratio may be any number.
+    below = np.minimum(ratio * factor, MOST_LIGHT * grid.color_in[shown].max(axis=0) ** 2)
     ratios = np.ones_like(luminance)
-    ratios[shown] = np.nan_to_num(image.read(ratio * factor) / grid.color_in[shown], nan=1.0)
+    ratios[shown] = np.nan_to_num(image.read(below) / grid.color_in[shown], nan=1.0)
     return ratios
 
 
