@@ -33,7 +33,13 @@ def summed_pairs(samples, travel, irradiance, paths):
     position, normal, tangent, area = np.split(samples.astype(float), [3, 6, 9], axis=1)
     way = position[None] - position[:, None]
     chord = np.linalg.norm(way, axis=-1) + np.eye(len(way))
-    curvature = np.einsum("ijc,ijc->ij", normal[None] - normal[:, None], way) / chord**2
+    leaving, entering = np.einsum("jc,ijc->ij", normal, way), -np.einsum("ic,ijc->ij", normal, way)
+    total = entering + leaving
+    mean = np.copysign(2 * np.sqrt(np.maximum(entering * leaving, 0)), total)
+    # Across edges, and where the first channel's light diffuses.
+    is_edge = np.interp(np.abs(total) / chord, [0.25, 0.75], [0, 1])
+    is_diffuse = np.interp(chord * NODES[-1] / paths[0], [3, 6], [0, 1])
+    curvature = (total + is_edge * is_diffuse * (mean - total)) / chord**2
     binormal = np.cross(normal, tangent)
     x, y = np.einsum("ijc,ic->ij", way, tangent), np.einsum("ijc,ic->ij", way, binormal)
     fade = np.minimum(np.hypot(x, y) / (0.5 * chord), 1)  # of harmonics where a chord is steep

@@ -81,6 +81,16 @@ template <class Vector>
 // alone moves it. Larger: less time where a surface hardly bends, larger errors.
 constexpr float least_part = 1e-4f;
 
+// Sums of the sines of slopes from which on a pair counts as one across an edge, partly and wholly. Smaller: facets of
+// smooth meshes count; larger: edges are too bright.
+constexpr float edge_begin = 0.25f;
+constexpr float edge_end = 0.75f;
+
+// The same for chords from which on light diffuses, in transport mean free paths of the first result. Smaller: dark media
+// lose light at edges; larger: bright edges are too bright.
+constexpr float diffuse_begin = 3.0f;
+constexpr float diffuse_end = 6.0f;
+
 // Old processors have one function for any number of results: less code.
 constexpr bool is_plain = HWY_TARGET == HWY_SCALAR;
 
@@ -100,6 +110,13 @@ using Integers = std::int32_t __attribute__((vector_size(PairTargets::most * siz
     for (float& root : roots)
         root = std::sqrt(root);
     std::memcpy(&values, roots.data(), sizeof(values));
+}
+
+[[gnu::always_inline]] inline void clamp_part(Floats& part)
+{
+    const Floats zero{};
+    const Floats one = zero + 1.0f;
+    part = part < zero ? zero : part > one ? one : part;
 }
 
 // Pairs of one source and all targets.
@@ -123,6 +140,27 @@ struct Rows {
     std::array<Floats, 4> weight;                          // 0 for the next curvature at a node
     std::array<std::uint32_t, PairTargets::most> nearest;  // for derivatives, which are smooth and small
 };
+
+// Chord times the sum of the sines of a pair's slopes: the angles between the chord and the tangent planes at its ends, which
+// are equal on balls. Where they differ at a sharp edge, twice their geometric mean takes the place of their sum: far from
+// where light enters, it diffuses in proportion to their product (n_x . grad)(n_y . grad) 1/r.
+[[gnu::always_inline]] inline void find_bend(const PairTables& tables, const Floats& entering, const Floats& leaving,
+                                             const Floats& chord, Floats& bend)
+{
+    const Floats zero{};
+    const Floats sum = entering + leaving;
+    const Floats size = sum < zero ? zero - sum : sum;
+    Floats mean = entering * leaving;
+    mean = mean < zero ? zero : mean;
+    find_roots(mean);
+    mean = sum < zero ? -2.0f * mean : 2.0f * mean;
+    const Floats least = zero + std::numeric_limits<float>::min();
+    Floats is_edge = (size / (chord < least ? least : chord) - edge_begin) / (edge_end - edge_begin);
+    clamp_part(is_edge);
+    Floats is_diffuse = (chord * tables.most_curvature - diffuse_begin) / (diffuse_end - diffuse_begin);
+    clamp_part(is_diffuse);
+    bend = sum + is_edge * is_diffuse * (mean - sum);
+}
 
 // False if the source is beyond reach of all targets. `target` has positions, then normals.
 template <class Source>
@@ -161,16 +199,19 @@ template <class Source>
     const Floats after = reinterpret_cast<Floats>((step + 1) << within_chord_bits);
     const Floats zero{};
     const Floats one = zero + 1.0f;
-    const Floats part = (chord - before) / (after - before);
-    pairs.part = part < zero ? zero : part > one ? one : part;
+    pairs.part = (chord - before) / (after - before);
+    clamp_part(pairs.part);
     pairs.step = step - first;
     const Floats least = chord < before ? before : chord;
     const Floats square = least * least;
     pairs.per_square = one / square;
-    pairs.curvature =
-        (target[3] - source.normal.x) * dx + (target[4] - source.normal.y) * dy + (target[5] - source.normal.z) * dz;
+    const Floats leaving = target[3] * dx + target[4] * dy + target[5] * dz;
+    Floats entering = zero - (source.normal.x * dx + source.normal.y * dy + source.normal.z * dz);
     if constexpr (is_cluster)
-        pairs.curvature = (pairs.curvature + source.bend) / (square + 4.0f * source.spread);
+        entering += source.bend;
+    find_bend(tables, entering, leaving, chord, pairs.curvature);
+    if constexpr (is_cluster)
+        pairs.curvature = pairs.curvature / (square + 4.0f * source.spread);
     else
         pairs.curvature *= pairs.per_square;
     const Floats x = dx * source.tangent.x + dy * source.tangent.y + dz * source.tangent.z;
