@@ -43,6 +43,7 @@ def run(arguments: list[str]) -> int:
     from . import blender
     from .blender.jobs.run import batch_run
     from .core.batch import batch_options as command_line
+    from .core.batch.log_file import log_file, unwritable
     from .core.batch.stop import listening
     from .core.native import problem
 
@@ -51,11 +52,11 @@ def run(arguments: list[str]) -> int:
     if registers:
         blender.register()
     try:
-        trouble = problem or _open(options.scene)
+        trouble = problem or unwritable(options.log) or _open(options.scene)
         if trouble:
             print(f"Beamspread: {trouble}", file=sys.stderr)
             return 1
-        with listening() as stop:
+        with listening() as stop, log_file(options.log, _versions()):
             report = batch_run.bake_all(options, stop)
             is_saved = _save(report, options.report)
             if stop and not report.all_written():
@@ -68,6 +69,13 @@ def run(arguments: list[str]) -> int:
         if registers:
             bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
             blender.unregister()
+
+
+def _versions() -> str:
+    import bpy
+
+    version = (PACKAGE_FOLDER / "VERSION").read_text(encoding="utf-8").strip()
+    return f"Beamspread {version}, Blender {bpy.app.version_string}, Python {sys.version}"
 
 
 def _save(report, path: str | None) -> bool:

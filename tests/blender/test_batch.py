@@ -331,6 +331,23 @@ def test_verbose_prints_the_scene_and_the_stages(tmp_path):
     assert re.search(r"'Plane / Medium': [\d.]+ s, estimated [\d.]+ s", verbose)
 
 
+def test_a_log_has_versions_what_was_read_and_the_outcome(tmp_path):
+    """The second run appends to it. Nothing of it is printed."""
+    add_plane(material=add_material())
+    add_sun(0, strength=3.5)
+    scene, log = save_scene(tmp_path), tmp_path / "bakes.log"
+    for _ in range(2):
+        code, _, printed = run_batch(scene, "--no-indirect", "--log", log, "--output", tmp_path)
+        assert code == 0
+        assert "Sun 'Sun': strength" not in printed
+    lines = log.read_text().splitlines()
+    for words in (f"Blender {bpy.app.version_string}", "Sun 'Sun': strength 3.5", "Baking: ", "Plane_Medium.exr"):
+        assert sum(words in line for line in lines) == 2
+    code, _, printed = run_batch(scene, "--log", tmp_path, "--output", tmp_path / "other")
+    assert (code, (tmp_path / "other").exists()) == (1, False)
+    assert f"The log {tmp_path} cannot be written" in printed
+
+
 def test_a_sky_by_cycles_is_a_light_of_the_report(tmp_path):
     """Its line and its time stand in the log under its own name, and nothing is said of bounced light."""
     nodes, background = add_world(name="Sky")

@@ -8,7 +8,7 @@ def test_nothing_asked_leaves_all_to_the_scene():
     options = parse([])
     assert options.objects == ()
     assert {options.scene, options.frames, options.resolution, options.solver, options.output} == {None}
-    assert {options.format, options.report, options.pass_name, options.indirect} == {None}
+    assert {options.format, options.report, options.log, options.pass_name, options.indirect} == {None}
     assert {options.allow_dark, options.verbose} == {False}
 
 
@@ -16,13 +16,13 @@ def test_every_option():
     options = parse(
         ["room.blend", "--object", "Floor", "--object", "Wall", "--frames", "2-5", "--resolution", "512"]
         + ["--solver", "direct", "--output", "out", "--format", "png", "--report", "report.json"]
-        + ["--pass", "Irradiance", "--no-indirect", "--allow-dark", "--verbose"]
+        + ["--pass", "Irradiance", "--no-indirect", "--allow-dark", "--verbose", "--log", "bakes.log"]
     )
     assert options.scene == "room.blend"
     assert options.objects == ("Floor", "Wall")
     assert (options.frames, options.resolution, options.solver) == ((2, 5), 512, "direct")
     assert (options.output, options.format, options.report) == ("out", "PNG", "report.json")
-    assert (options.pass_name, options.indirect) == ("IRRADIANCE", False)
+    assert (options.pass_name, options.indirect, options.log) == ("IRRADIANCE", False, "bakes.log")
     assert options.allow_dark
     assert options.verbose
 

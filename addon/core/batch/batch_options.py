@@ -33,6 +33,7 @@ class BatchOptions:
     verbose: bool
     resume: bool
     save: bool
+    log: str | None
 
 
 def arguments_for_script(argv: Sequence[str], inside_blender: bool) -> list[str]:
@@ -102,6 +103,9 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument("--report", metavar="FILE.json", help="write the result of each bake")
     parser.add_argument("--allow-dark", action="store_true", help="exit code 0 even if no light arrives")
     parser.add_argument("--verbose", action="store_true", help="print lights, triangles and the time of each stage")
+    parser.add_argument(
+        "--log", metavar="FILE", help="append versions, what --verbose prints, and the outcome of each bake to a file"
+    )
     parser.add_argument("--resume", action="store_true", help="skip bakes that an earlier run has written")
     parser.add_argument(
         "--save", action="store_true", help="save the .blend file with the UV maps that the run has made"

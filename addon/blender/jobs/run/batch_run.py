@@ -56,11 +56,12 @@ def bake_all(options: BatchOptions, stop: Stop | None = None) -> Report:
 def _show_log() -> None:
     """Print the log of the package: the lights and occluders that it reads, and the seconds of each stage."""
     log = logging.getLogger(__package__.rpartition(".blender.")[0])
-    if not log.handlers:
+    if not any(type(handler) is logging.StreamHandler for handler in log.handlers):
         printer = logging.StreamHandler(sys.stdout)
         printer.setFormatter(logging.Formatter("Beamspread: %(message)s"))
+        printer.setLevel(logging.INFO)  # outcomes are printed without it
         log.addHandler(printer)
-    log.setLevel(logging.INFO)
+    log.setLevel(min(log.level or logging.INFO, logging.INFO))
 
 
 class _Batch(Sink):
@@ -134,6 +135,7 @@ class _Batch(Sink):
         if record.status != CANCELLED:
             stream = sys.stdout if record.status in (WRITTEN, SKIPPED) else sys.stderr
             print(f"Beamspread: {record}", file=stream, flush=True)
+        logging.getLogger(__name__).debug("%s", record)
 
     def _find(self) -> tuple[list[Target], list[Bake]]:
         """Targets to bake, and failed bakes of objects that can't be baked."""
@@ -203,7 +205,7 @@ class _Batch(Sink):
             self._parts = self._parts_of(recorded)  # with the UV maps that the reader makes
         for target in targets:
             bake = _cancelled(target) if self._stop else next(prepared)
-            if self._options.verbose:
+            if self._options.verbose or self._options.log:
                 for line in inventory.lines(bake):
                     logging.getLogger(__name__).info(line)
             yield bake
