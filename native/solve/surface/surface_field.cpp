@@ -383,12 +383,13 @@ LatticeShape SurfaceField::lattice(std::size_t sample) const
     return {in_frame(m_problem.steps[sample].x), in_frame(m_problem.steps[sample].y)};
 }
 
-UnevenRings SurfaceField::uneven_rings(std::size_t sample, SurfaceTree::Sources& sources) const
+bool SurfaceField::add_uneven(std::size_t sample, SurfaceTree::Sources& sources, std::array<float, 3>& sums) const
 {
     const auto& [position, normal, tangent, area] = m_problem.samples[sample];
     const SampleSteps& steps = m_problem.steps[sample];
     const UnevenSample own{position, normal, tangent, steps.x, steps.y, m_problem.uneven_sides[sample]};
-    m_tree.find_near(position, near_sides * own.side, sources);
+    if (!m_tree.find_near(position, near_sides * own.side, most_near, sources))
+        return false;
     std::vector<NearSample> near;
     for (const PairSource* other : sources.near) {
         if (other->moments == sample)
@@ -397,17 +398,18 @@ UnevenRings SurfaceField::uneven_rings(std::size_t sample, SurfaceTree::Sources&
         near.push_back({other->position, other->normal, of_other.x, of_other.y, m_problem.samples[other->moments].area,
                         m_tables.disks[other->disk]->radius});
     }
-    return rings_around(own, m_tables.first_ring(), near);
+    m_tables.add_uneven_light(rings_around(own, m_tables.first_ring(), near),
+                              m_moments.data() + sample * m_basis.lanes.moments(), sums.data());
+    return true;
 }
 
 void SurfaceField::add_self(std::size_t sample, SurfaceTree::Sources& sources, std::array<float, 3>& sums) const
 {
-    const float* moments = m_moments.data() + sample * m_basis.lanes.moments();
-    if (!m_problem.uneven_sides.empty() && m_problem.uneven_sides[sample] > 0.0f)
-        m_tables.add_uneven_light(uneven_rings(sample, sources), moments, sums.data());
-    else
-        m_tables.add_self_light(m_problem.samples[sample].area, neighbor_disk(sample), lattice(sample), moments,
-                                sums.data());
+    const bool is_uneven = !m_problem.uneven_sides.empty() && m_problem.uneven_sides[sample] > 0.0f;
+    if (is_uneven && add_uneven(sample, sources, sums))
+        return;
+    m_tables.add_self_light(m_problem.samples[sample].area, neighbor_disk(sample), lattice(sample),
+                            m_moments.data() + sample * m_basis.lanes.moments(), sums.data());
 }
 
 void SurfaceField::store(std::size_t sample, const Exitance& exitance, float* luminance)

@@ -120,7 +120,8 @@ private:
     float neighbor_disk(std::size_t sample) const;
     LatticeShape lattice(std::size_t sample) const;
     void add_self(std::size_t sample, SurfaceTree::Sources& sources, std::array<float, 3>& sums) const;
-    UnevenRings uneven_rings(std::size_t sample, SurfaceTree::Sources& sources) const;
+    // False if too many samples are near.
+    bool add_uneven(std::size_t sample, SurfaceTree::Sources& sources, std::array<float, 3>& sums) const;
     void store(std::size_t sample, const Exitance& exitance, float* luminance);
     double luminance_of(const ChannelSets::Member& member, float exitance) const;
     void set_color(const std::vector<double>& color);

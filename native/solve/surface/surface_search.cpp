@@ -177,7 +177,7 @@ void SurfaceTree::find(const Group& group, const Opening& opening, float reach, 
     }
 }
 
-void SurfaceTree::find_near(const Vec3f& place, float distance, Sources& sources) const
+bool SurfaceTree::find_near(const Vec3f& place, float distance, std::size_t most, Sources& sources) const
 {
     sources.near.clear();
     sources.waiting.assign(1, 0);
@@ -195,7 +195,10 @@ void SurfaceTree::find_near(const Vec3f& place, float distance, Sources& sources
         for (const PairSource& sample : lit_samples(node))
             if (glm::length(sample.position - place) < distance)
                 sources.near.push_back(&sample);
+        if (sources.near.size() > most)
+            return false;
     }
+    return true;
 }
 
 }  // namespace beamspread

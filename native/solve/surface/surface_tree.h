@@ -93,8 +93,8 @@ public:
     // Finds the sources of one of these groups.
     void find(const Group& group, const Opening& opening, float reach, Sources& sources) const;
 
-    // Finds the lit samples within a distance (metres) of a place.
-    void find_near(const Vec3f& place, float distance, Sources& sources) const;
+    // Finds the lit samples within a distance (metres) of a place; false if there are more than `most`.
+    bool find_near(const Vec3f& place, float distance, std::size_t most, Sources& sources) const;
 
 private:
     // One line of the cache.

@@ -37,6 +37,10 @@ inline constexpr std::uint32_t steps_per_ring = 4;
 // Largest distance of samples that count as near, in sides of the texel.
 inline constexpr float near_sides = 2.5f;
 
+// Most samples that count as near; where texels beside are far smaller, there are more, and the sample has the own light of
+// a lattice. More: longer.
+inline constexpr std::size_t most_near = 512;
+
 // Least radius of a ring, over that of the smallest disk: no other sample's disk comes nearer.
 inline constexpr float least_ring = disk_begin_radii - 1.0f;
 
