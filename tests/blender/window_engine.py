@@ -120,6 +120,8 @@ def fail_to_render():
     """F12 on a full disk."""
     render_copy.SceneCopy, works = Broken, render_copy.SceneCopy
     results["popups"].clear()
+    # The job of the last picture ends after its handlers have run; until then Blender refuses another one.
+    yield lambda: not bpy.app.is_job_running("RENDER")
     in_window(bpy.ops.render.render, "INVOKE_DEFAULT")
     yield lambda: results["popups"]
     yield lambda: not bpy.app.is_job_running("RENDER")
