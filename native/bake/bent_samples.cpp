@@ -237,7 +237,7 @@ void BentSamples::find_neighbors(const ReceiverGrid& grid)
                                                    (last + 1) % grid.width > 0 ? last + 1 : i,
                                                    middle >= grid.width ? middle - grid.width : i,
                                                    middle + grid.width < grid.texels() ? middle + grid.width : i};
-        // Where texels have other numbers of pieces, their disks are no lattice.
+        // Pieces beside whole texels, or beside more pieces, are no lattice.
         const bool is_even = std::ranges::all_of(
             beside, [&](std::size_t n) { return of_texel[n].count == 0 || of_texel[n].count == of_texel[i].count; });
         for (std::uint32_t k = 0; k < of_texel[i].count; ++k) {

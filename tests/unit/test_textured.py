@@ -167,7 +167,7 @@ def test_azimuths_are_as_dense_in_half_of_the_light():
     beams = beams_of([(light, np.float32(way / np.linalg.norm(way, axis=-1, keepdims=True)))], near=True)
     azimuths = np.unique([np.degrees(np.arctan2(y, x)).round(1) for _, (x, y, _) in beams])
     assert np.ptp(azimuths) > 120
-    # Half of a step between 2.5 steps and 3.
+    # Steps are 30 degrees for light from all around, up to 36 for light from a part of it.
     assert np.diff(azimuths).max() < 36
     np.testing.assert_allclose(sum(part for part, _ in beams), light, rtol=1e-5)
 
